@@ -1,0 +1,1 @@
+"""Imitation of a task from a video filmed from any viewpoint."""

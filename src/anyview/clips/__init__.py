@@ -1,0 +1,1 @@
+"""Video in and out, manifests, recording, ingest, the surrogate rig, splits and paired sampling."""

@@ -1,0 +1,275 @@
+"""``params.yaml`` as strict typed models: an unknown, ill-typed or impossible key is refused by its dotted name."""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from anyview.runtime.errors import AnyviewError
+
+Count = Annotated[int, Field(ge=1)]
+NonNegative = Annotated[float, Field(ge=0)]
+Positive = Annotated[float, Field(gt=0)]
+Fraction = Annotated[float, Field(ge=0, le=1)]
+Discount = Annotated[float, Field(ge=0, lt=1)]
+
+
+class Block(BaseModel):
+    """A block of params: no unknown keys, no silent conversions."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class Base(Block):
+    """Shared by every stage."""
+
+    seed: int = Field(ge=0, description="root of every named random stream")
+
+
+class Sim(Block):
+    """The pusher's world, the same for demonstrations and agents."""
+
+    image_size: Literal[32, 64, 128] = Field(description="height and width of a frame in pixels")
+    control: Literal["twist", "torque"] = Field(description="the agent's action: end-effector twist or joint torques")
+
+
+class DemonstrationSet(Block):
+    """One set of simulated demonstrations."""
+
+    demos: Count = Field(description="demonstrations to render")
+
+
+class Simulate(Block):
+    """Stage `simulate`: the simulated demonstrations."""
+
+    shard: Count = Field(description="demonstrations in one video shard")
+    diverse: DemonstrationSet
+    narrow: DemonstrationSet
+
+
+class Film(Block):
+    """Stage `film`: the surrogate webcam clips."""
+
+    pairs: Count = Field(description="pairs of two views of one demonstration")
+    singles: int = Field(ge=0, description="demonstrations that one camera saw")
+    extreme_pairs: int = Field(ge=0, description="pairs of extreme distractor clips, for validation only")
+    width: int = Field(ge=160, le=1920, multiple_of=16, description="width of a raw frame; the height is 9/16 of it")
+
+
+class Ingest(Block):
+    """Stage `ingest`: raw clips to aligned small ones."""
+
+    size: Literal[32, 48, 64] = Field(description="height and width of a clip in pixels")
+    frames: int = Field(ge=8, description="frames of a clip")
+    rate: Positive = Field(description="frames per second after resampling")
+    max_megabytes: Positive = Field(description="a larger raw file is refused")
+
+
+class Real(Block):
+    """Real clips: where they come from and how they are brought into shape."""
+
+    source: Literal["surrogate", "recorded"] = Field(
+        description="`surrogate`: rendered stand-ins; `recorded`: your own clips in data/real/raw"
+    )
+    film: Film
+    ingest: Ingest
+
+
+class SplitSim(Block):
+    """Split of a simulated set."""
+
+    validation: Fraction = Field(description="fraction of the demonstrations held out")
+
+
+class SplitReal(Block):
+    """Split of the real clips, by pair. Counts that the data cannot fill become fractions of what there is."""
+
+    train: Count = Field(description="clips to train on")
+    validation: Count = Field(description="clips held out")
+
+
+class Split(Block):
+    """Stage `split`."""
+
+    sim: SplitSim
+    real: SplitReal
+
+
+class LossWeights(Block):
+    """Weights of the translator's losses; 0 leaves a loss out."""
+
+    translation: NonNegative
+    reconstruction: NonNegative
+    alignment: NonNegative
+
+    @model_validator(mode="after")
+    def _some_loss(self) -> "LossWeights":
+        if self.translation == self.reconstruction == self.alignment == 0:
+            raise ValueError("at least one loss weight must be above 0")
+        return self
+
+
+class TranslatorCell(Block):
+    """One translator to train."""
+
+    method: Literal["translator"]
+    dataset: Literal["sim-diverse", "sim-narrow", "real"]
+    architecture: Literal["real", "sim", "compact"]
+    optimizer: Literal["adam", "adadelta"]
+    iterations: Count
+    weights: LossWeights
+    augment: bool = Field(description="augment the contexts during training")
+
+
+class EmbeddingCell(Block):
+    """The time-contrastive embedding of the `tcn` baseline."""
+
+    method: Literal["time-contrastive"]
+    dataset: Literal["sim-diverse", "sim-narrow", "real"]
+    iterations: Count
+    dimensions: Count = Field(description="size of the embedding")
+    margin: Positive = Field(description="triplet margin")
+
+
+class Training(Block):
+    """Shared by every translator cell."""
+
+    batch_size: Count
+    learning_rate: Positive
+    validation_every: Count = Field(description="iterations between validations")
+    validation_pairs: Count = Field(description="frame pairs in the fixed validation set")
+
+
+class Translation(Block):
+    """Stages `train` and `translate`."""
+
+    training: Training
+    cells: dict[str, Annotated[TranslatorCell | EmbeddingCell, Field(discriminator="method")]]
+
+
+class Reward(Block):
+    """The translated demonstration's reward (equations 20 to 22)."""
+
+    phi: NonNegative = Field(description="weight of the image reward L_i beside the feature reward L_f")
+    time_power: NonNegative = Field(description="reward at step t is weighted by (t/49) to this power")
+    demonstrations: Count = Field(description="demonstrations whose translations are averaged")
+
+
+class DDPG(Block):
+    """Deep deterministic policy gradient."""
+
+    hidden: list[Count] = Field(min_length=1, description="widths of policy and critic")
+    policy_learning_rate: Positive
+    critic_learning_rate: Positive
+    discount: Discount
+    batch_size: Count
+    updates_per_step: Positive
+    target_rate: Annotated[float, Field(gt=0, le=1)] = Field(description="Polyak rate of the target networks")
+    replay: Count = Field(description="transitions kept per run")
+    warmup_episodes: int = Field(ge=0, description="episodes of noise alone before updates start")
+    n_step: Count = Field(description="rewards summed before bootstrapping")
+    noise: NonNegative = Field(description="Ornstein-Uhlenbeck scale at the start, in units of the action range")
+    noise_end: NonNegative = Field(description="the same at the end")
+    noise_theta: Fraction = Field(description="Ornstein-Uhlenbeck mean reversion per step")
+
+
+class TRPO(Block):
+    """Trust-region policy optimisation."""
+
+    hidden: list[Count] = Field(min_length=1)
+    batch_episodes: Count = Field(description="episodes per policy step")
+    discount: Discount
+    gae_lambda: Fraction
+    step: Positive = Field(description="bound on the mean KL divergence")
+    damping: NonNegative
+    conjugate_gradient_steps: Count
+
+
+class Discriminator(Block):
+    """Image discriminators of TPIL and GAIL."""
+
+    batch_size: Count
+    learning_rate: Positive
+    steps_per_iteration: Count
+    domain_weight: NonNegative = Field(description="gradient reversal of TPIL's domain head")
+
+
+class ImitationCell(Block):
+    """One method to evaluate."""
+
+    learner: Literal["ddpg", "trpo"]
+    reward: Literal["translated", "true", "embedding", "tpil", "gail"]
+    source: str = Field(description="what the reward is made from: a model folder, or the discriminator's module")
+    feature: bool = Field(description="use the feature reward L_f")
+    image: bool = Field(description="use the image reward L_i")
+
+    @model_validator(mode="after")
+    def _some_reward(self) -> "ImitationCell":
+        if not (self.feature or self.image):
+            raise ValueError("feature and image are both false: there is no reward left")
+        return self
+
+
+class Imitation(Block):
+    """Stage `imitate`: policies and their evaluation."""
+
+    runs: Count = Field(description="contexts, each with a policy of its own")
+    iterations: Count
+    episodes_per_iteration: Count = Field(description="episodes of 49 steps that each run acts in an iteration")
+    reward: Reward
+    ddpg: DDPG
+    trpo: TRPO
+    discriminator: Discriminator
+    cells: dict[str, ImitationCell]
+
+
+class Params(Block):
+    """The whole of ``params.yaml``."""
+
+    base: Base
+    sim: Sim
+    simulate: Simulate
+    real: Real
+    split: Split
+    translation: Translation
+    imitation: Imitation
+
+
+def read_yaml(path: Path) -> Any:
+    """Parse a YAML 1.2 file (so that ``1e-3`` is a number, as DVC reads it)."""
+    try:
+        return YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise AnyviewError(f"{path}: no such file; run from the root of the repository") from None
+    except (YAMLError, UnicodeDecodeError) as error:
+        raise AnyviewError(f"{path}: not valid YAML: {' '.join(str(error).split())}") from None
+
+
+def parse_params(values: Any, name: str = "params.yaml") -> Params:
+    """Check ``values``; the first impossible key is named, with every other one counted."""
+    try:
+        return Params.model_validate(values)
+    except ValidationError as error:
+        raise AnyviewError(f"{name}: {_explain(error)}") from None
+
+
+def load_params(path: Path = Path("params.yaml")) -> Params:
+    """Read and check ``params.yaml``."""
+    return parse_params(read_yaml(path), str(path))
+
+
+def _explain(error: ValidationError) -> str:
+    first, *others = error.errors()
+    tags = {"translator", "time-contrastive"}
+    key = ".".join(str(part) for part in first["loc"] if part not in tags) or "the file"
+    if first["type"] == "extra_forbidden":
+        message = "unknown key"
+    elif first["type"] == "missing":
+        message = "missing key"
+    else:
+        message = first["msg"].removeprefix("Value error, ")
+        if not isinstance(first["input"], dict):
+            message += f", got {first['input']!r}"
+    return f"{key}: {message}" + (f" (and {len(others)} more)" if others else "")

@@ -1,0 +1,1 @@
+"""Rewards, reinforcement learners and the evaluation over many runs."""

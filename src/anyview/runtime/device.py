@@ -1,0 +1,32 @@
+"""Which device computes, and how: machine facts that come from the environment, never from params."""
+
+import os
+
+import torch
+
+from anyview.runtime.errors import AnyviewError
+
+
+def torch_device() -> torch.device:
+    """The device that ``ANYVIEW_DEVICE`` (auto, cpu or cuda; default auto) asks for."""
+    wish = os.environ.get("ANYVIEW_DEVICE", "auto")
+    if wish not in ("auto", "cpu", "cuda"):
+        raise AnyviewError(f"ANYVIEW_DEVICE={wish}: must be auto, cpu or cuda")
+    if wish == "cuda" and not torch.cuda.is_available():
+        raise AnyviewError("ANYVIEW_DEVICE=cuda: PyTorch finds no CUDA device; set it to auto or cpu")
+    return torch.device("cuda" if wish != "cpu" and torch.cuda.is_available() else "cpu")
+
+
+def use_threads(count: int) -> None:
+    """Fix the intra-op threads: reductions split by thread count, so a fixed count keeps the bytes fixed."""
+    torch.set_num_threads(count)
+
+
+def worker_count() -> int:
+    """Worker processes that ``ANYVIEW_WORKERS`` asks for (default: every core, at most 16)."""
+    text = os.environ.get("ANYVIEW_WORKERS", "")
+    if not text:
+        return min(len(os.sched_getaffinity(0)), 16)
+    if not text.isdigit() or int(text) < 1:
+        raise AnyviewError(f"ANYVIEW_WORKERS={text}: must be a whole number of at least 1")
+    return int(text)

@@ -1,0 +1,48 @@
+"""The scratch folder: checkpoints and decoded frames, which any machine can make again.
+
+``ANYVIEW_SCRATCH`` names it (default ``~/.cache/anyview``). Entries are keyed by a hash of what they were made
+from (params, code, data), so that a change in any of these starts afresh and nothing stale is ever read.
+"""
+
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+
+def scratch_root() -> Path:
+    """The scratch folder (not created)."""
+    return Path(os.environ.get("ANYVIEW_SCRATCH") or Path.home() / ".cache" / "anyview")
+
+
+def content_key(values: Any, files: Iterable[Path] = ()) -> str:
+    """Hex key of JSON-serialisable ``values`` and of the bytes of ``files`` (order does not matter)."""
+    digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode())
+    for path in sorted(files):
+        digest.update(path.name.encode() + b"\0")
+        with path.open("rb") as handle:
+            digest.update(hashlib.file_digest(handle, "sha256").digest())
+    return digest.hexdigest()[:24]
+
+
+def scratch_folder(kind: str, key: str) -> Path:
+    """Folder ``<scratch>/<kind>/<key>``, created."""
+    folder = scratch_root() / kind / key
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def scratch_size() -> int:
+    """Bytes that the scratch folder holds."""
+    return sum(path.stat().st_size for path in scratch_root().rglob("*") if path.is_file())
+
+
+def clear_scratch() -> int:
+    """Empty the scratch folder; returns the bytes freed. Only the kinds that we make are removed."""
+    freed = scratch_size()
+    for kind in ("checkpoints", "frames"):
+        shutil.rmtree(scratch_root() / kind, ignore_errors=True)
+    return freed - scratch_size()

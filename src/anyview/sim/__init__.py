@@ -1,0 +1,1 @@
+"""The planar pusher: scene, contexts, camera, environments and the scripted expert."""

@@ -1,0 +1,1 @@
+"""The context translator: network, losses, training, evaluation, feature weights."""
