@@ -1,0 +1,190 @@
+"""The context translator: two encoders, the translation module and the decoder with skips.
+
+Enc1(o_t^i) -> z1 reads the expert's frame, Enc2(o_0^j) -> z2 the first frame of the target context,
+T(z1, z2) -> z3, and Dec(z3, skips of Enc2(o_0^j)) is the expert's frame as the target context would show it.
+"""
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from anyview.runtime.errors import AnyviewError
+
+ArchitectureName = Literal["real", "sim", "compact"]
+
+_KERNEL = 5
+_LEAK = 0.2
+_COLOURS = 3
+
+
+@dataclass(frozen=True)
+class Architecture:
+    """Layers of one translator, each convolution as (output channels, stride)."""
+
+    encoder: tuple[tuple[int, int], ...]
+    decoder: tuple[tuple[int, int], ...]
+    width: int
+    shared: bool
+    dropout: float
+
+    @property
+    def stride(self) -> int:
+        """Input pixels to a pixel of the last convolution's map."""
+        return int(np.prod([stride for _, stride in self.encoder]))
+
+
+ARCHITECTURES: dict[ArchitectureName, Architecture] = {
+    "real": Architecture(
+        encoder=((32, 1), (16, 2), (16, 1), (8, 2)),
+        decoder=((16, 2), (16, 1), (32, 2), (_COLOURS, 1)),
+        width=100,
+        shared=True,
+        dropout=0.5,
+    ),
+    "sim": Architecture(
+        encoder=((64, 2), (128, 2), (256, 2), (512, 2)),
+        decoder=((256, 2), (128, 2), (64, 2), (_COLOURS, 2)),
+        width=1024,
+        shared=False,
+        dropout=0.0,
+    ),
+    "compact": Architecture(
+        encoder=((16, 2), (32, 2), (64, 2), (128, 2)),
+        decoder=((64, 2), (32, 2), (16, 2), (_COLOURS, 2)),
+        width=256,
+        shared=False,
+        dropout=0.0,
+    ),
+}
+
+
+def to_input(frames: np.ndarray | Tensor) -> Tensor:
+    """Network input (..., 3, H, W) in [-1, 1], float32, of uint8 ``frames`` (..., H, W, 3)."""
+    pixels = torch.as_tensor(frames).movedim(-1, -3)
+    return pixels.to(torch.float32).div_(127.5).sub_(1.0)
+
+
+def to_frames(output: Tensor) -> np.ndarray:
+    """uint8 frames (..., H, W, 3) of network output (..., 3, H, W)."""
+    pixels = output.detach().float().add(1.0).mul(127.5).round_().clamp_(0.0, 255.0)
+    return pixels.to(torch.uint8).movedim(-3, -1).cpu().numpy()
+
+
+class Encoder(nn.Module):
+    """Four convolutions and two connected layers: (N, 3, H, W) -> z (N, width) and the four maps."""
+
+    def __init__(self, architecture: Architecture, image_size: int):
+        super().__init__()
+        channels = [_COLOURS, *(count for count, _ in architecture.encoder)]
+        self.convolutions = nn.ModuleList(
+            nn.Conv2d(before, after, _KERNEL, stride, padding=_KERNEL // 2)
+            for before, (after, stride) in zip(channels, architecture.encoder, strict=False)
+        )
+        side = image_size // architecture.stride
+        self.hidden = nn.Linear(channels[-1] * side * side, architecture.width)
+        self.output = nn.Linear(architecture.width, architecture.width)
+        self.dropout = nn.Dropout(architecture.dropout)
+
+    def forward(self, frames: Tensor) -> tuple[Tensor, list[Tensor]]:
+        maps = []
+        x = frames
+        for convolution in self.convolutions:
+            x = F.leaky_relu(convolution(x), _LEAK)
+            maps.append(x)
+        hidden = self.dropout(F.leaky_relu(self.hidden(x.flatten(1)), _LEAK))
+        return self.output(hidden), maps
+
+
+class Translation(nn.Module):
+    """T: the concatenated features (N, width) of both encoders -> z3 (N, width)."""
+
+    def __init__(self, architecture: Architecture):
+        super().__init__()
+        self.hidden = nn.Linear(2 * architecture.width, architecture.width)
+        self.output = nn.Linear(architecture.width, architecture.width)
+        self.dropout = nn.Dropout(architecture.dropout)
+
+    def forward(self, z1: Tensor, z2: Tensor) -> Tensor:
+        hidden = self.dropout(F.leaky_relu(self.hidden(torch.cat((z1, z2), dim=1)), _LEAK))
+        return self.output(hidden)
+
+
+class Decoder(nn.Module):
+    """A connected layer and four fractional convolutions, each of them fed Enc2's map of equal size too."""
+
+    def __init__(self, architecture: Architecture, image_size: int):
+        super().__init__()
+        self._side = image_size // architecture.stride
+        skips = [count for count, _ in reversed(architecture.encoder)]
+        inputs = [skips[0], *(count for count, _ in architecture.decoder)]
+        self.hidden = nn.Linear(architecture.width, skips[0] * self._side**2)
+        self.dropout = nn.Dropout(architecture.dropout)
+        self.convolutions = nn.ModuleList(
+            nn.ConvTranspose2d(
+                before + skip, after, _KERNEL, stride, padding=_KERNEL // 2, output_padding=stride - 1
+            )
+            for before, skip, (after, stride) in zip(inputs, skips, architecture.decoder, strict=False)
+        )
+
+    def forward(self, z: Tensor, skips: list[Tensor]) -> Tensor:
+        x = self.dropout(F.leaky_relu(self.hidden(z), _LEAK)).unflatten(1, (-1, self._side, self._side))
+        for index, convolution in enumerate(self.convolutions):
+            skip = skips[-1 - index]
+            skip = skip.repeat(len(z) // len(skip), 1, 1, 1)
+            x = convolution(torch.cat((x, skip), dim=1))
+            if index < len(self.convolutions) - 1:
+                x = F.leaky_relu(x, _LEAK)
+        return x
+
+
+class ContextTranslator(nn.Module):
+    """The whole translator for square frames of ``image_size`` pixels.
+
+    Raises ``AnyviewError`` for an unknown architecture or a size that its strides do not divide.
+    """
+
+    def __init__(self, architecture: ArchitectureName, image_size: int):
+        super().__init__()
+        if architecture not in get_args(ArchitectureName):
+            raise AnyviewError(f"architecture {architecture!r}: must be one of {', '.join(ARCHITECTURES)}")
+        layers = ARCHITECTURES[architecture]
+        if image_size < layers.stride or image_size % layers.stride:
+            raise AnyviewError(
+                f"architecture {architecture}: image size {image_size} must be a multiple of {layers.stride}"
+            )
+        self.architecture = architecture
+        self.image_size = image_size
+        self.width = layers.width
+        self.expert_encoder = Encoder(layers, image_size)
+        # In `real` both encoders are one module: its weights are shared, and stored once.
+        self.context_encoder = self.expert_encoder if layers.shared else Encoder(layers, image_size)
+        self.translation = Translation(layers)
+        self.decoder = Decoder(layers, image_size)
+
+    @property
+    def shared(self) -> bool:
+        """Whether Enc1 and Enc2 are one encoder."""
+        return self.context_encoder is self.expert_encoder
+
+    def encode_expert(self, frames: Tensor) -> Tensor:
+        """Enc1: z1 (N, width) of ``frames`` (N, 3, H, W) in [-1, 1]."""
+        return self.expert_encoder(frames)[0]
+
+    def encode_context(self, frames: Tensor) -> tuple[Tensor, list[Tensor]]:
+        """Enc2: z2 (N, width) of first frames (N, 3, H, W), and the four maps that the decoder skips to."""
+        return self.context_encoder(frames)
+
+    def translate(self, z1: Tensor, z2: Tensor) -> Tensor:
+        """T: z3 (N, width) of z1 (N, width) and z2 (N, width)."""
+        return self.translation(z1, z2)
+
+    def decode(self, z: Tensor, skips: list[Tensor]) -> Tensor:
+        """Dec: frames (N, 3, H, W) of z (N, width) and the skips of K contexts, where K divides N.
+
+        Row n is decoded in context n modulo K: one context serves a whole clip, or a batch two decodings.
+        """
+        return self.decoder(z, skips)
