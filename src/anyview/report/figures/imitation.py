@@ -1,0 +1,148 @@
+"""Figures 19 and 20 and what explains them: differences, learning curves, returns, the 2x2."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from anyview.report.cells import label
+from anyview.report.figures.style import BLUE, DASHES, GREEN, INK, QUIET, SKY, THESIS, VERMILLION, canvas
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A value with its 95% bounds, and what the thesis has for it (None where it is silent)."""
+
+    cell: str
+    value: float
+    low: float
+    high: float
+    thesis: float | None = None
+
+
+def success(bars: Sequence[Bar]) -> Figure:
+    """Success rates with Wilson intervals, and the thesis's rates as diamonds."""
+    with canvas(0.36 * len(bars) + 1.0) as (figure, (axis,)):
+        places = np.arange(len(bars))
+        values = np.array([bar.value for bar in bars])
+        errors = np.abs(np.array([[bar.low, bar.high] for bar in bars]).T - values)
+        axis.barh(places, 100 * values, height=0.62, color=SKY, label="here")
+        axis.errorbar(
+            100 * values, places, xerr=100 * errors, fmt="none", ecolor=INK, capsize=3, label="95% (Wilson)"
+        )
+        stated = [
+            (100 * bar.thesis, place)
+            for place, bar in zip(places, bars, strict=True)
+            if bar.thesis is not None
+        ]
+        if stated:
+            axis.plot(
+                *zip(*stated, strict=True),
+                linestyle="none",
+                label="thesis",
+                clip_on=False,
+                zorder=4,
+                **THESIS,
+            )
+        axis.set_yticks(places, [label(bar.cell) for bar in bars])
+        axis.set(xlim=(0, 100), xlabel="runs that succeed (%)")
+        _tidy_rows(axis)
+        figure.legend(loc="outside upper right", ncols=3)
+        return figure
+
+
+def differences(bars: Sequence[Bar]) -> Figure:
+    """Paired differences of final distance against `ours`, in metres; coloured where 0 is excluded."""
+    with canvas(0.34 * len(bars) + 1.0) as (figure, (axis,)):
+        axis.axvline(0, color=QUIET, linewidth=1)
+        for place, bar in enumerate(bars):
+            color = VERMILLION if bar.low > 0 else GREEN if bar.high < 0 else QUIET
+            marker = ">" if bar.low > 0 else "<" if bar.high < 0 else "o"
+            axis.plot([100 * bar.low, 100 * bar.high], [place, place], color=color, linewidth=2.2)
+            axis.plot(100 * bar.value, place, marker=marker, color=color, markersize=7)
+        axis.set_yticks(range(len(bars)), [label(bar.cell) for bar in bars])
+        axis.set(
+            xlabel="final distance minus that of ours (cm), mean and 95%", title="Nearer  ←  ours  →  farther"
+        )
+        _tidy_rows(axis)
+        return figure
+
+
+def learning(
+    curves: Mapping[str, pd.DataFrame], reference: str, measure: str, unit: str, scale: float
+) -> Figure:
+    """Small multiples: median and quartiles of ``measure`` over the runs, `reference` in grey behind.
+
+    Each table has columns ``iteration, run`` and ``measure``.
+    """
+    rows = -(-len(curves) // 2)
+    with canvas(1.55 * rows + 0.5, rows=1) as (figure, (whole,)):
+        whole.remove()
+        grid = figure.subplots(rows, 2, sharex=True, sharey=True, squeeze=False)
+        for axis, (cell, curve) in zip(grid.flat, curves.items(), strict=False):
+            if reference in curves and cell != reference:
+                median = curves[reference].groupby("iteration")[measure].median()
+                axis.plot(median.index, scale * median, color=QUIET, linewidth=1, linestyle="--")
+            quartiles = scale * curve.groupby("iteration")[measure].quantile([0.25, 0.5, 0.75]).unstack()
+            axis.fill_between(
+                quartiles.index, quartiles[0.25], quartiles[0.75], color=SKY, alpha=0.45, linewidth=0
+            )
+            axis.plot(quartiles.index, quartiles[0.5], color=BLUE)
+            axis.set_title(label(cell), fontsize=9, fontweight="normal")
+        for axis in list(grid.flat)[len(curves) :]:
+            axis.set_visible(False)
+        figure.supxlabel("iteration", fontsize=9.5)
+        figure.supylabel(f"{measure.replace('_', ' ')} ({unit})", fontsize=9.5)
+        return figure
+
+
+def returns(tables: Mapping[str, pd.DataFrame]) -> Figure:
+    """The return table, mean over runs: 0 is standing still, 1 the expert's own motion."""
+    with canvas(0.38 * len(tables) + 1.05) as (figure, (axis,)):
+        styles = {
+            "return_arm_only": ("arm without object", "s", VERMILLION),
+            "return_policy": ("policy", "o", BLUE),
+        }
+        axis.axvline(0, color=QUIET, linewidth=1)
+        axis.axvline(1, color=QUIET, linewidth=1)
+        for place, table in enumerate(tables.values()):
+            scale = table["return_expert"] - table["return_still"]
+            for column, (name, marker, color) in styles.items():
+                share = ((table[column] - table["return_still"]) / scale).mean()
+                axis.plot(share, place, marker, color=color, markersize=7, label=name if place == 0 else None)
+        axis.set_yticks(range(len(tables)), [label(cell) for cell in tables])
+        axis.set(xlabel="return: 0 standing still, 1 the expert's own motion")
+        _tidy_rows(axis)
+        figure.legend(loc="outside upper right", ncols=2)
+        return figure
+
+
+def factorial(bars: Mapping[tuple[str, str], Bar]) -> Figure:
+    """The 2x2: mean final distance for (contexts, learner), lines for the learners."""
+    with canvas(2.7) as (figure, (axis,)):
+        contexts = ("narrow", "diverse")
+        for index, learner in enumerate(("TRPO", "DDPG")):
+            cells = [bars[context, learner] for context in contexts]
+            places = np.arange(2) + 0.04 * (index - 0.5)
+            values = 100 * np.array([bar.value for bar in cells])
+            errors = np.abs(100 * np.array([[bar.low, bar.high] for bar in cells]).T - values)
+            color, dash = (VERMILLION, BLUE)[index], DASHES[1 - index]
+            axis.errorbar(
+                places, values, yerr=errors, color=color, linestyle=dash, marker="os"[index], capsize=3
+            )
+            axis.annotate(
+                learner, (places[1], values[1]), (8, 0), textcoords="offset points", color=color, va="center"
+            )
+        axis.set_xticks([0, 1], ["narrow contexts", "diverse contexts"])
+        axis.set(ylabel="mean final distance (cm)", xlim=(-0.3, 1.45))
+        axis.set_ylim(bottom=0)
+        axis.grid(axis="x", visible=False)
+        return figure
+
+
+def _tidy_rows(axis) -> None:
+    axis.invert_yaxis()
+    axis.grid(axis="y", visible=False)
+    axis.tick_params(axis="y", length=0)

@@ -1,0 +1,79 @@
+"""Figures 13 to 18: training on real clips, feature weights, strips."""
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from anyview.report import thesis
+from anyview.report.figures.style import BLUE, INK, QUIET, SKY, THESIS, canvas
+from anyview.report.pictures import Strip
+
+
+def training(curve: pd.DataFrame, reference: thesis.TrainingRun) -> Figure:
+    """Figures 13 and 14: total and validation loss over iterations, and the points that the thesis states.
+
+    ``curve`` has columns ``iteration, loss, validation_loss``; the latter is empty between validations.
+    """
+    with canvas(4.6, rows=2, sharex=True) as (figure, axes):
+        for axis, column, title, points in (
+            (axes[0], "loss", "Total loss", reference.total.points()),
+            (axes[1], "validation_loss", "Validation loss", reference.validation.points()),
+        ):
+            stated = curve[["iteration", column]].dropna()
+            if column == "loss" and len(stated) > 200:
+                axis.plot(
+                    stated["iteration"],
+                    stated[column],
+                    color=SKY,
+                    linewidth=0.6,
+                    alpha=0.7,
+                    label="one batch",
+                )
+                stated = stated.assign(loss=stated["loss"].rolling(25, center=True, min_periods=1).median())
+            axis.plot(stated["iteration"], stated[column], color=BLUE, label="here")
+            axis.plot(*zip(*points, strict=True), linestyle="none", label="thesis", **THESIS)
+            axis.set(title=title, yscale="log", ylabel="loss, batch of 100")
+            axis.legend()
+        axes[1].set_xscale("symlog", linthresh=100)
+        axes[1].set_xlabel("iteration (linear to 100, then logarithmic)")
+        return figure
+
+
+def feature_weights(weights: np.ndarray) -> Figure:
+    """Figure 15: weight of each frame, (T,), beside the thesis's shape scaled to the same sum of 1."""
+    with canvas(2.8) as (figure, (axis,)):
+        frames = np.arange(len(weights))
+        axis.bar(frames, weights, width=1.0, color=SKY, edgecolor=BLUE, linewidth=0.3, label="here")
+        if len(weights) == thesis.FRAMES:
+            shape = thesis.feature_weight_shape()
+            axis.step(frames, shape, where="mid", color=THESIS["color"], label="thesis, scaled to sum to 1")
+        axis.set(xlabel="frame", ylabel="feature weight", xlim=(-1, len(weights)))
+        axis.grid(axis="x", visible=False)
+        axis.legend()
+        return figure
+
+
+def strip(content: Strip, title: str = "") -> Figure:
+    """Frames in rows with their labels and time steps, pixels kept sharp."""
+    count = len(content.steps)
+    aspect = len(content.rows) / count
+    with canvas(5.2 * aspect + 0.55) as (figure, (axis,)):
+        picture = np.concatenate([np.concatenate(list(frames), axis=1) for _, frames in content.rows])
+        height, width = content.rows[0][1].shape[1:3]
+        axis.imshow(picture, interpolation="nearest")
+        for column in range(1, count):
+            axis.axvline(column * width - 0.5, color="white", linewidth=1)
+        for row in range(1, len(content.rows)):
+            axis.axhline(row * height - 0.5, color="white", linewidth=2)
+        axis.set_xticks(
+            [(index + 0.5) * width for index in range(count)], [str(step) for step in content.steps]
+        )
+        axis.set_yticks(
+            [(row + 0.5) * height for row in range(len(content.rows))], [row[0] for row in content.rows]
+        )
+        axis.tick_params(length=0, labelcolor=INK)
+        axis.set_xlabel("step", color=QUIET)
+        axis.set_title(title)
+        axis.grid(visible=False)
+        axis.spines[:].set_visible(False)
+        return figure

@@ -1,0 +1,75 @@
+"""Frames as pictures for the page: film strips that play in the browser, and strips of stills."""
+
+import base64
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+_QUALITY = 82
+
+
+@dataclass(frozen=True)
+class Strip:
+    """Rows of (label, frames uint8 RGB (n, H, W, 3)), side by side in time; ``steps`` are the n times."""
+
+    rows: tuple[tuple[str, np.ndarray], ...]
+    steps: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Film:
+    """A clip as one picture, its ``count`` frames one under another, for a player that shows one."""
+
+    source: str
+    count: int
+    width: int
+    height: int
+    alt: str
+
+
+def every(frames: np.ndarray, stride: int) -> tuple[int, ...]:
+    """Every ``stride``-th step of a clip (T, H, W, 3), and always the last: where things end."""
+    last = len(frames) - 1
+    steps = [step for step in range(0, last, stride) if last - step >= stride / 2]
+    return (*steps, last)
+
+
+def make_strip(rows: Sequence[tuple[str, np.ndarray]], stride: int = 7) -> Strip:
+    """A strip of every ``stride``-th frame of clips of equal length."""
+    steps = every(rows[0][1], stride)
+    return Strip(tuple((label, frames[list(steps)]) for label, frames in rows), steps)
+
+
+def make_film(frames: np.ndarray, alt: str, stride: int = 2) -> Film:
+    """A film of every ``stride``-th frame of ``frames``, uint8 RGB (T, H, W, 3)."""
+    kept = frames[list(every(frames, stride))]
+    count, height, width, _ = kept.shape
+    return Film(webp(kept.reshape(count * height, width, 3)), count, width, height, alt)
+
+
+def side_by_side(frames: np.ndarray) -> np.ndarray:
+    """Frames (n, H, W, 3) in one row (H, n W, 3)."""
+    return np.concatenate(list(frames), axis=1)
+
+
+def webp(picture: np.ndarray) -> str:
+    """``picture``, uint8 RGB (H, W, 3), as a data URI."""
+    return _data_uri("webp", _encode(".webp", picture, [cv2.IMWRITE_WEBP_QUALITY, _QUALITY]))
+
+
+def svg_uri(svg: str) -> str:
+    """SVG text as a data URI: as an image, a figure cannot clash with another's ids."""
+    return _data_uri("svg+xml", svg.encode())
+
+
+def _data_uri(kind: str, content: bytes) -> str:
+    return f"data:image/{kind};base64,{base64.b64encode(content).decode()}"
+
+
+def _encode(extension: str, picture: np.ndarray, options: list[int]) -> bytes:
+    done, content = cv2.imencode(extension, cv2.cvtColor(picture, cv2.COLOR_RGB2BGR), options)
+    if not done:
+        raise RuntimeError(f"OpenCV cannot encode {extension}")
+    return content.tobytes()

@@ -1,0 +1,85 @@
+"""The drawn pipeline: edges follow the files, cells follow the params."""
+
+import xml.etree.ElementTree as ElementTree
+
+import pytest
+
+from anyview.report.dag import draw, needed_edges, read_stages
+from anyview.runtime.errors import AnyviewError
+
+PARAMS = {
+    "translation": {"cells": {"sim": {"dataset": "diverse"}, "tcn": {"dataset": "diverse"}}},
+    "imitation": {"cells": {"ours": {"source": "data/models/sim"}, "gail": {"source": "src/gail.py"}}},
+}
+PIPELINE = {
+    "stages": {
+        "simulate": {
+            "foreach": ["diverse", "narrow"],
+            "do": {"cmd": "x", "desc": "film the expert", "outs": ["data/sim/${item}"]},
+        },
+        "split": {"cmd": "x", "deps": ["data/sim/diverse"], "outs": [{"data/splits": {"cache": False}}]},
+        "train": {
+            "foreach": "${translation.cells}",
+            "do": {
+                "cmd": "x",
+                "deps": ["data/sim/${item.dataset}", "data/splits/sim.csv"],
+                "outs": ["data/models/${key}"],
+            },
+        },
+        "imitate": {
+            "foreach": "${imitation.cells}",
+            "do": {
+                "cmd": "x",
+                "deps": ["${item.source}", "data/sim/diverse"],
+                "outs": ["data/policies/${key}"],
+            },
+        },
+    }
+}
+
+
+def test_edges_follow_files_and_leave_out_what_longer_paths_imply():
+    stages = read_stages(PIPELINE, PARAMS)
+    assert needed_edges(stages) == {
+        "simulate": {"split"},
+        "split": {"train"},
+        "train": {"imitate"},
+        "imitate": set(),
+    }
+
+
+def test_cells_come_from_lists_and_from_params():
+    cells = {stage.name: stage.cells for stage in read_stages(PIPELINE, PARAMS)}
+    assert cells == {
+        "simulate": ("diverse", "narrow"),
+        "split": (),
+        "train": ("sim", "tcn"),
+        "imitate": ("ours", "gail"),
+    }
+
+
+def test_the_drawing_is_well_formed_and_names_every_stage():
+    svg = ElementTree.fromstring(draw(read_stages(PIPELINE, PARAMS)))
+    words = {text.text for text in svg.iter("text")}
+    assert {"simulate", "split", "train", "imitate", "2 cells", "one run"} <= words
+    left, top, width, height = map(float, svg.attrib["viewBox"].split())
+    for box in svg.iter("rect"):
+        assert left <= float(box.attrib["x"]) <= width - float(box.attrib["width"])
+        assert top <= float(box.attrib["y"]) <= height - float(box.attrib["height"])
+
+
+@pytest.mark.parametrize("pipeline", [{}, [], {"stages": {"train": {"foreach": "${no.such}", "do": {}}}}])
+def test_an_unreadable_pipeline_is_one_clear_error(pipeline):
+    with pytest.raises(AnyviewError, match=r"dvc\.yaml"):
+        read_stages(pipeline, PARAMS)
+
+
+def test_a_circle_is_refused():
+    circle = {
+        "stages": {
+            "a": {"cmd": "x", "deps": ["two"], "outs": ["one"]},
+            "b": {"cmd": "x", "deps": ["one"], "outs": ["two"]},
+        }
+    }
+    with pytest.raises(AnyviewError, match="circle"):
+        draw(read_stages(circle, PARAMS))
