@@ -12,7 +12,7 @@ FRAMES = 50  # of an episode: o_0 after reset, then o_t after action t
 ACTIONS = FRAMES - 1
 APPROACH_END = 14  # step at which the cup stands behind the object
 PUSH_END = 42  # step at which the object lies on the goal; then the expert rests
-STANDOFF = 0.06  # metres between the cup's seat and the object before the push
+STANDOFF = 0.04  # metres between the cup's seat and the object before the push
 APPROACH_CLEARANCE = 0.02  # metres between cup and object during the approach
 
 

@@ -106,7 +106,7 @@ def model(control: str) -> mujoco.MjModel:
         rgba="{_DARK}" contype="2" conaffinity="0"/>
     </default>
     <default class="object">
-      <joint type="slide" damping="2"/>
+      <joint type="slide" damping="4"/>
       <geom contype="0" conaffinity="2" condim="1"/>
     </default>
   </default>
