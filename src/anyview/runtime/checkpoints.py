@@ -13,7 +13,9 @@ from safetensors.numpy import load, save
 from anyview.runtime.outputs import write_atomically
 
 _MAGIC = b"anyview-checkpoint-1\n"
-_SLOTS = ("a", "b")
+_SLOTS = ("checkpoint-a", "checkpoint-b")
+
+Checkpoint = tuple[int, dict[str, np.ndarray], dict[str, Any]]
 
 
 class Checkpoints:
@@ -28,50 +30,59 @@ class Checkpoints:
         self.folder = folder
         self._every = every_seconds
         self._saved = time.monotonic()
+        self._next: str | None = None
 
     def due(self) -> bool:
         """Whether the last checkpoint is ``every_seconds`` old."""
         return time.monotonic() - self._saved >= self._every
 
     def save(self, step: int, arrays: dict[str, np.ndarray], state: dict[str, Any]) -> None:
-        """Keep ``arrays`` and ``state`` as they are after ``step`` units of work."""
-        contiguous = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
-        body = save(contiguous, metadata={"step": str(step), "state": json.dumps(state)})
-        content = _MAGIC + hashlib.sha256(body).hexdigest().encode() + b"\n" + body
-        newest = self._newest_slot()
-        slot = _SLOTS[1 - _SLOTS.index(newest)] if newest else _SLOTS[0]
-        write_atomically(self._path(slot), content)
+        """Keep ``arrays`` and ``state`` as they are after ``step`` units of work, beside the one before."""
+        plain = {name: np.asarray(array, order="C") for name, array in arrays.items()}
+        body = save(plain, metadata={"step": str(step), "state": json.dumps(state)})
+        slot = self._next or _other(self._newest()[0])
+        write_atomically(self.folder / slot, b"".join((_MAGIC, _digest(body), body)))
+        self._next = _other(slot)
         self._saved = time.monotonic()
 
-    def load(self) -> tuple[int, dict[str, np.ndarray], dict[str, Any]] | None:
+    def load(self) -> Checkpoint | None:
         """The newest checkpoint that is whole: (step, arrays, state), or None."""
-        found = [entry for slot in _SLOTS if (entry := self._read(slot)) is not None]
-        return max(found, key=lambda entry: entry[0]) if found else None
+        slot, checkpoint = self._newest()
+        self._next = _other(slot)
+        return checkpoint
 
     def clear(self) -> None:
         """Remove the checkpoints: the work is finished and its output stands."""
         for slot in _SLOTS:
-            self._path(slot).unlink(missing_ok=True)
+            (self.folder / slot).unlink(missing_ok=True)
+        self._next = None
 
-    def _path(self, slot: str) -> Path:
-        return self.folder / f"checkpoint-{slot}"
+    def _newest(self) -> tuple[str, Checkpoint | None]:
+        found = [(slot, checkpoint) for slot in _SLOTS if (checkpoint := _read(self.folder / slot))]
+        return max(found, key=lambda entry: entry[1][0]) if found else (_SLOTS[1], None)
 
-    def _newest_slot(self) -> str | None:
-        entries = [(entry[0], slot) for slot in _SLOTS if (entry := self._read(slot)) is not None]
-        return max(entries)[1] if entries else None
 
-    def _read(self, slot: str) -> tuple[int, dict[str, np.ndarray], dict[str, Any]] | None:
-        try:
-            content = self._path(slot).read_bytes()
-        except OSError:
-            return None
-        head = len(_MAGIC) + 65
-        body = content[head:]
-        if content[:head] != _MAGIC + hashlib.sha256(body).hexdigest().encode() + b"\n":
-            return None
-        try:
-            arrays = load(body)
-            metadata = json.loads(body[8 : 8 + int.from_bytes(body[:8], "little")])["__metadata__"]
-        except (SafetensorError, ValueError, KeyError):
-            return None
+def _other(slot: str) -> str:
+    return _SLOTS[1 - _SLOTS.index(slot)]
+
+
+def _digest(body: bytes | memoryview) -> bytes:
+    return hashlib.sha256(body).hexdigest().encode() + b"\n"
+
+
+def _read(path: Path) -> Checkpoint | None:
+    """The checkpoint in ``path``, or None where there is no whole one."""
+    try:
+        content = path.read_bytes()
+    except OSError:
+        return None
+    head = len(_MAGIC) + 65
+    body = content[head:]
+    if content[:head] != _MAGIC + _digest(body):
+        return None
+    try:
+        arrays = load(body)
+        metadata = json.loads(body[8 : 8 + int.from_bytes(body[:8], "little")])["__metadata__"]
         return int(metadata["step"]), arrays, json.loads(metadata["state"])
+    except (SafetensorError, ValueError, KeyError, TypeError):
+        return None

@@ -1,14 +1,20 @@
 """Which device computes, and how: machine facts that come from the environment, never from params."""
 
 import os
+from typing import TYPE_CHECKING
 
-import torch
+import joblib
 
 from anyview.runtime.errors import AnyviewError
 
+if TYPE_CHECKING:  # most stages do without PyTorch, which takes seconds to import
+    import torch
 
-def torch_device() -> torch.device:
+
+def torch_device() -> "torch.device":
     """The device that ``ANYVIEW_DEVICE`` (auto, cpu or cuda; default auto) asks for."""
+    import torch
+
     wish = os.environ.get("ANYVIEW_DEVICE", "auto")
     if wish not in ("auto", "cpu", "cuda"):
         raise AnyviewError(f"ANYVIEW_DEVICE={wish}: must be auto, cpu or cuda")
@@ -19,14 +25,16 @@ def torch_device() -> torch.device:
 
 def use_threads(count: int) -> None:
     """Fix the intra-op threads: reductions split by thread count, so a fixed count keeps the bytes fixed."""
+    import torch
+
     torch.set_num_threads(count)
 
 
 def worker_count() -> int:
-    """Worker processes that ``ANYVIEW_WORKERS`` asks for (default: every core, at most 16)."""
+    """Worker processes that ``ANYVIEW_WORKERS`` asks for (default: the cores that we may use, at most 16)."""
     text = os.environ.get("ANYVIEW_WORKERS", "")
     if not text:
-        return min(len(os.sched_getaffinity(0)), 16)
-    if not text.isdigit() or int(text) < 1:
+        return min(joblib.cpu_count(), 16)
+    if not text.isascii() or not text.isdigit() or int(text) < 1:
         raise AnyviewError(f"ANYVIEW_WORKERS={text}: must be a whole number of at least 1")
     return int(text)

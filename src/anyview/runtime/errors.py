@@ -1,5 +1,7 @@
-"""Errors that a user can act on, and how a stage ends on them."""
+"""Errors that a user can act on, and how a stage or a command ends on them."""
 
+import errno
+import os
 import signal
 import sys
 from collections.abc import Callable
@@ -20,29 +22,48 @@ class Terminated(BaseException):
     """SIGTERM arrived: unwind as on Ctrl-C, so that temporary outputs are removed."""
 
 
-def _raise_terminated(signum: int, frame: FrameType | None) -> NoReturn:
-    raise Terminated
-
-
 def run_stage(main: Callable[[list[str]], None]) -> NoReturn:
-    """Run a stage's ``main(arguments)`` and exit as a user would expect.
+    """Run a stage's ``main(arguments)`` and exit as a user would expect (see ``exit_code``).
 
-    Exit codes: 0 done, 2 bad input (one line on standard error, no traceback), 130 interrupted. The
-    process ends when its parent does, so that a killed ``dvc repro`` leaves no orphan behind.
+    The process ends when its parent does, so that a killed ``dvc repro`` leaves no orphan behind.
     """
     end_with_parent()
     signal.signal(signal.SIGTERM, _raise_terminated)
+    sys.exit(exit_code(lambda: main(sys.argv[1:]), "interrupted: run the same command again to continue"))
+
+
+def exit_code(action: Callable[[], object], interrupted: str = "interrupted") -> int:
+    """Run ``action``: 0 done, 2 bad input (one line on standard error, no traceback), 130 interrupted."""
     try:
-        main(sys.argv[1:])
+        action()
+        sys.stdout.flush()
     except AnyviewError as error:
-        print(f"error: {error}", file=sys.stderr)
-        sys.exit(BAD_INPUT)
+        print(f"error: {' '.join(str(error).split())}", file=sys.stderr)
+        return BAD_INPUT
+    except BrokenPipeError:  # the reader of a pipe, such as `head`, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
     except OSError as error:
-        if error.filename is None and error.errno is None:
+        if error.errno is None:
             raise
-        print(f"error: {error.filename or 'file system'}: {error.strerror or error}", file=sys.stderr)
-        sys.exit(BAD_INPUT)
+        print(f"error: {_explain(error)}", file=sys.stderr)
+        return BAD_INPUT
     except (KeyboardInterrupt, Terminated):
-        print("interrupted: run the same command again to continue", file=sys.stderr)
-        sys.exit(INTERRUPTED)
-    sys.exit(0)
+        print(interrupted, file=sys.stderr)
+        return INTERRUPTED
+    return 0
+
+
+def _explain(error: OSError) -> str:
+    name = f"{error.filename}: " if error.filename is not None else ""
+    hint = {
+        errno.ENOSPC: "; free some space and run the same command again to continue",
+        errno.EROFS: "; write to a folder that is not read-only",
+        errno.EACCES: "; check the permissions",
+    }.get(error.errno or 0, "")
+    return f"{name}{error.strerror or error}{hint}"
+
+
+def _raise_terminated(signum: int, frame: FrameType | None) -> NoReturn:
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # once is enough: a second must not cut the clean-up short
+    raise Terminated

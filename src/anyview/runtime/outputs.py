@@ -14,23 +14,37 @@ def whole_folder(target: Path) -> Iterator[Path]:
     On any error, Ctrl-C included, the new folder is removed and an earlier ``target`` stays as it was.
     """
     partial = target.with_name(f".{target.name}.partial")
-    shutil.rmtree(partial, ignore_errors=True)
+    previous = target.with_name(f".{target.name}.previous.partial")
+    for leftover in (partial, previous):
+        shutil.rmtree(leftover, ignore_errors=True)
     partial.mkdir(parents=True)
     try:
         yield partial
         if target.exists():
-            shutil.rmtree(target)
+            target.rename(previous)
         partial.rename(target)
     finally:
-        shutil.rmtree(partial, ignore_errors=True)
+        for leftover in (partial, previous):
+            shutil.rmtree(leftover, ignore_errors=True)
 
 
 def write_atomically(path: Path, content: bytes | str) -> None:
-    """Write ``content`` to ``path`` through a temporary file in the same folder."""
+    """Write ``content`` to ``path`` through a temporary file in the same folder.
+
+    It is on the disk before it takes the name, so that not even a power cut leaves half of it there.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f".{path.name}.partial")
     try:
-        partial.write_bytes(content.encode() if isinstance(content, str) else content)
+        with partial.open("wb") as file:
+            file.write(content.encode() if isinstance(content, str) else content)
+            file.flush()
+            os.fsync(file.fileno())
         os.replace(partial, path)
     finally:
         partial.unlink(missing_ok=True)
+    folder = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)

@@ -1,4 +1,4 @@
-"""End a process when its parent does: SIGTERM or SIGKILL to ``dvc`` alone would orphan the stage."""
+"""End a process when its parent does: a signal to ``dvc`` alone would orphan the stage that it started."""
 
 import ctypes
 import os
@@ -6,53 +6,55 @@ import signal
 import sys
 import threading
 import time
+from typing import Any
 
 _PR_SET_PDEATHSIG = 1
-_POLL_SECONDS = 2.0
+_POLL_SECONDS = 1.0
+_GRACE_SECONDS = 20.0
+_SHELLS = {"sh", "bash", "dash", "zsh", "fish", "ksh"}
 
 
 def end_with_parent() -> None:
-    """Ask for SIGTERM when the parent process dies.
+    """End this process when its parent ends: SIGTERM, then, should that not be enough, SIGKILL.
 
-    On Linux the kernel sends it. ``dvc`` starts a stage through a shell, so the parent may be a shell
-    that outlives ``dvc``: a daemon thread therefore also watches the chain up to the first ``dvc``.
+    ``dvc`` starts a stage through a shell, which outlives a killed ``dvc``. So a thread watches the parent and,
+    where that is ``dvc``'s shell, ``dvc`` too. On Linux the kernel also reports the parent's end at once.
     """
+    parent = os.getppid()
     if sys.platform.startswith("linux"):
         ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
-    ancestors = _ancestors()
-    if ancestors:
-        threading.Thread(target=_watch, args=(ancestors,), daemon=True).start()
+        if os.getppid() != parent:  # it ended before we could ask
+            os.kill(os.getpid(), signal.SIGTERM)
+    threading.Thread(target=_watch, args=(_watched(parent),), name="parent", daemon=True).start()
 
 
-def _ancestors() -> list[tuple[int, float]]:
-    """(pid, start time) of the parent, and of its parent when a shell or ``dvc`` stands between."""
+def _watched(parent: int) -> list[Any]:
+    """The parent process and, behind a shell of ``dvc``'s, the first process above that is no shell."""
     import psutil
 
-    chain: list[tuple[int, float]] = []
     try:
-        process = psutil.Process().parent()
-        while process is not None and process.pid > 1:
-            name = " ".join(process.cmdline()[:3])
-            chain.append((process.pid, process.create_time()))
-            if "dvc" in name:
-                return chain
-            process = process.parent()
-    except psutil.Error:
+        chain = [psutil.Process(parent)]
+        while "DVC_STAGE" in os.environ and chain[-1].name() in _SHELLS and (above := chain[-1].parent()):
+            chain.append(above)
+    except psutil.Error:  # out of our sight, as on the other side of a container's wall
         return []
-    return chain[:1]
+    return chain
 
 
-def _watch(ancestors: list[tuple[int, float]]) -> None:
-    import psutil
-
-    while all(_alive(psutil, pid, started) for pid, started in ancestors):
+def _watch(processes: list[Any]) -> None:
+    if not processes:
+        return
+    while all(_alive(process) for process in processes):
         time.sleep(_POLL_SECONDS)
     os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(_GRACE_SECONDS)
+    os.kill(os.getpid(), signal.SIGKILL)
 
 
-def _alive(psutil, pid: int, started: float) -> bool:
+def _alive(process: Any) -> bool:
+    import psutil
+
     try:
-        process = psutil.Process(pid)
-        return process.create_time() == started and process.status() != psutil.STATUS_ZOMBIE
+        return process.is_running() and process.status() != psutil.STATUS_ZOMBIE
     except psutil.Error:
         return False
