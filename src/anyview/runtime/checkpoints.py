@@ -21,9 +21,9 @@ Checkpoint = tuple[int, dict[str, np.ndarray], dict[str, Any]]
 class Checkpoints:
     """The two newest checkpoints of one piece of work, in a scratch folder of its own.
 
-    A checkpoint is a dictionary of numpy arrays and a JSON-serialisable ``state``. The file is the magic line,
-    the SHA-256 of the rest, then a safetensors body that carries the state as metadata. A file that is cut
-    short or altered fails its checksum and the one before it is used.
+    A checkpoint is a dictionary of numpy arrays and a JSON-serialisable ``state``. The file is the magic
+    line, the SHA-256 of the rest, then a safetensors body that carries the state as metadata. A file that is
+    cut short or altered fails its checksum and the one before it is used.
     """
 
     def __init__(self, folder: Path, every_seconds: float = 60.0):

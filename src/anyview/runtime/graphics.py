@@ -44,7 +44,7 @@ def probe(backend: str) -> str:
 
 
 def find_backend() -> str | None:
-    """The first backend that renders (the one that ``MUJOCO_GL`` names before others); None where none does."""
+    """The first backend that renders, the one that ``MUJOCO_GL`` names before others; None if none does."""
     wish = os.environ.get("MUJOCO_GL")
     return next((name for name in sorted(BACKENDS, key=lambda name: name != wish) if not probe(name)), None)
 
@@ -52,9 +52,9 @@ def find_backend() -> str | None:
 def load_mujoco() -> ModuleType:
     """Import ``mujoco`` with a headless OpenGL. Must come before any other import of it in the process.
 
-    ``ANYVIEW_GL`` keeps the choice for child processes, which then need not look again. Where no backend works,
-    MuJoCo comes without one: physics runs, and ``require_graphics`` says what is missing. Software rendering
-    stays in the calling thread, since workers already keep every core busy.
+    ``ANYVIEW_GL`` keeps the choice for child processes, which then need not look again. Where no backend
+    works, MuJoCo comes without one: physics runs, and ``require_graphics`` says what is missing. Software
+    rendering stays in the calling thread, since workers already keep every core busy.
     """
     if os.environ.get("ANYVIEW_GL") not in (*BACKENDS, "disabled"):
         os.environ["ANYVIEW_GL"] = find_backend() or "disabled"

@@ -12,9 +12,9 @@ from anyview.runtime.outputs import write_atomically
 def once(folder: Path, name: str, make: Callable[[], tuple[Any, list[str]]]) -> Any:
     """The result of ``make()``, or the one that an earlier try left in ``folder`` under ``name``.
 
-    ``make`` writes files into ``folder`` and returns its JSON-serialisable result and the files' names. An earlier
-    result counts only while all its files have the SHA-256 that they had then. ``folder`` has to be keyed by
-    everything that the result depends on (see ``runtime.scratch``).
+    ``make`` writes files into ``folder`` and returns its JSON-serialisable result and the files' names. An
+    earlier result counts only while all its files have the SHA-256 that they had then. ``folder`` has to be
+    keyed by everything that the result depends on (see ``runtime.scratch``).
     """
     record_path = folder / f"{name}.json"
     found, record = _read(folder, record_path)

@@ -6,7 +6,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
 _LOG_SECONDS = 15.0
 
@@ -29,7 +36,9 @@ class Tracker:
             self._shown = time.monotonic()
             elapsed = self._shown - self._started
             left = elapsed / max(self._done - self._first, 1) * (self._total - self._done)
-            print(f"{self._label}: {self._done}/{self._total} ({left:.0f} s left) {note}".rstrip(), flush=True)
+            print(
+                f"{self._label}: {self._done}/{self._total} ({left:.0f} s left) {note}".rstrip(), flush=True
+            )
 
 
 @contextmanager

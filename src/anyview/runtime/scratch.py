@@ -1,7 +1,7 @@
 """The scratch folder: checkpoints and decoded frames, which any machine can make again.
 
-``ANYVIEW_SCRATCH`` names it (default ``~/.cache/anyview``). Entries are keyed by a hash of what they were made
-from (params, code, data), so that a change in any of these starts afresh and nothing stale is ever read.
+``ANYVIEW_SCRATCH`` names it (default ``~/.cache/anyview``). Entries are keyed by a hash of what they were
+made from (params, code, data), so that a change in any of these starts afresh and nothing stale is read.
 """
 
 import hashlib

@@ -1,41 +1,115 @@
-"""Independent units of work, side by side: local processes by default, a Ray cluster by ANYVIEW_BACKEND=ray."""
+"""Independent units of work, side by side: processes by default, a Ray cluster by ANYVIEW_BACKEND=ray.
 
+Joblib has a Ray backend too, but that one runs units in actors, which are not retried when a node dies, and
+yields nothing before the last unit is done. Ray's plain tasks do both.
+"""
+
+import logging
 import os
+import signal
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from functools import cache
+from pathlib import Path
 from typing import Any, TypeVar
 
 import joblib
+from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from anyview.runtime.device import worker_count
 from anyview.runtime.errors import AnyviewError
+from anyview.runtime.parent import end_with_parent
 
 T = TypeVar("T")
+
+_RETRIES = 3
 
 
 def run_units(function: Callable[..., T], units: Sequence[tuple[Any, ...]]) -> Iterator[T]:
     """Yield ``function(*unit)`` for every unit, in order, as results arrive.
 
-    A unit must not depend on how many workers there are: then results have the same bytes for any number.
+    A unit must not depend on how many workers there are, and computes with a fixed number of threads: then
+    results have the same bytes for any number of workers. On a cluster a unit may run twice, because one whose
+    node dies is tried again elsewhere; and every node must see the same working directory and scratch folder.
     """
     backend = os.environ.get("ANYVIEW_BACKEND", "local")
     if backend not in ("local", "ray"):
         raise AnyviewError(f"ANYVIEW_BACKEND={backend}: must be local or ray")
     if backend == "ray":
-        _use_ray()
+        yield from _run_on_ray(function, units)
     elif worker_count() == 1 or len(units) == 1:
         yield from (function(*unit) for unit in units)
-        return
-    parallel = joblib.Parallel(n_jobs=min(worker_count(), len(units)), return_as="generator", batch_size=1)
-    yield from parallel(joblib.delayed(function)(*unit) for unit in units)
+    else:
+        yield from _run_locally(function, units)
 
 
-def _use_ray() -> None:
+def _run_locally(function: Callable[..., T], units: Sequence[tuple[Any, ...]]) -> Iterator[T]:
+    with joblib.parallel_config(backend="loky", inner_max_num_threads=1):
+        parallel = joblib.Parallel(min(worker_count(), len(units)), return_as="generator", batch_size=1)
+    try:
+        yield from parallel(joblib.delayed(_local_unit)(function, unit) for unit in units)
+    except TerminatedWorkerError:
+        raise AnyviewError(
+            "a worker process was killed, perhaps for want of memory; run the same command again to continue, with "
+            "a smaller ANYVIEW_WORKERS if it happens again"
+        ) from None
+
+
+def _local_unit(function: Callable[..., T], unit: tuple[Any, ...]) -> T:
+    _settle()
+    return function(*unit)
+
+
+@cache
+def _settle() -> None:
+    """Once in a worker: end with the stage, and leave Ctrl-C to it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent()
+
+
+def _run_on_ray(function: Callable[..., T], units: Sequence[tuple[Any, ...]]) -> Iterator[T]:
+    ray = _connect()
+    task = ray.remote(num_cpus=1, max_retries=_RETRIES)(_ray_unit)
+    shared = {name: value for name, value in os.environ.items() if name.startswith("ANYVIEW_")}
+    function = ray.put(function)
+    pending = deque(task.remote(function, unit, os.getcwd(), shared) for unit in units)
+    try:
+        while pending:
+            yield ray.get(pending[0])
+            pending.popleft()
+    except ray.exceptions.RayTaskError as error:
+        raise error.cause from None
+    except ray.exceptions.RayError as error:
+        raise AnyviewError(f"Ray gave up on a unit of work after {_RETRIES} tries: {error}") from None
+    finally:
+        for reference in pending:
+            ray.cancel(reference, force=True)
+
+
+def _ray_unit(
+    function: Callable[..., T], unit: tuple[Any, ...], folder: str, environment: dict[str, str]
+) -> T:
+    if not Path(folder).is_dir():
+        raise AnyviewError(f"{folder}: a Ray node does not see it; keep the repository on shared storage")
+    os.chdir(folder)
+    os.environ.update(environment)
+    return function(*unit)
+
+
+def _connect() -> Any:
+    """Ray, connected to the cluster at ``RAY_ADDRESS`` or else to one of this machine's own."""
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     try:
         import ray
-        from ray.util.joblib import register_ray
     except ImportError:
-        raise AnyviewError("ANYVIEW_BACKEND=ray: Ray is not installed; run `pip install anyview[cluster]`") from None
+        raise AnyviewError(
+            "ANYVIEW_BACKEND=ray: Ray is not installed; run `pip install anyview[cluster]`"
+        ) from None
     if not ray.is_initialized():
-        ray.init(address=os.environ.get("RAY_ADDRESS"), log_to_driver=False)
-    register_ray()
-    joblib.parallel_config(backend="ray")
+        address = os.environ.get("RAY_ADDRESS")
+        own: dict[str, Any] = {} if address else {"include_dashboard": False, "num_cpus": worker_count()}
+        try:
+            ray.init(address, log_to_driver=False, logging_level=logging.ERROR, **own)
+        except (ConnectionError, ValueError) as error:
+            raise AnyviewError(f"RAY_ADDRESS={address}: {error}") from None
+    return ray

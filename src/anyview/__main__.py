@@ -1,0 +1,5 @@
+"""``python -m anyview``."""
+
+from anyview.cli import main
+
+main()

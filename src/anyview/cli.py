@@ -1,0 +1,154 @@
+"""The ``anyview`` command."""
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict
+from importlib import import_module
+from typing import Annotated, Any, NoReturn
+
+import typer
+from rich.console import Console
+from typer.core import TyperCommand, TyperGroup
+
+from anyview.runtime.errors import AnyviewError, exit_code
+
+_NOT_FIT = 1  # exit code: nothing was wrong with the input, but the answer is no
+
+# The commands of the other packages: where they are, and the line that stands for them in `anyview --help`,
+# so that no command has to wait for the imports of another.
+_ELSEWHERE = {
+    "record": ("anyview.clips.commands", "Film your own clips with one or two webcams."),
+    "clips": ("anyview.clips.commands", "List and check the clips that there are."),
+    "translate": ("anyview.translation.commands", "Translate a clip to another viewpoint."),
+    "watch": ("anyview.imitation.commands", "Watch a trained policy act."),
+    "review": ("anyview.report.commands", "Summarise what changed since a revision, as Markdown."),
+}
+
+
+class _Elsewhere(TyperCommand):
+    """A command whose module is imported when it is called."""
+
+    def make_context(self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any) -> Any:
+        assert self.name is not None
+        return _load(self.name).make_context(info_name, args, parent=parent, **extra)
+
+
+class _Commands(TyperGroup):
+    """The commands of this module and, in a fixed order, those from elsewhere."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        here = super().list_commands(ctx)
+        return [*(name for name in here if name != "clean"), *_ELSEWHERE, "clean"]
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        if cmd_name in _ELSEWHERE:
+            return _Elsewhere(cmd_name, help=_ELSEWHERE[cmd_name][1], callback=lambda: None)
+        return super().get_command(ctx, cmd_name)
+
+
+app = typer.Typer(
+    cls=_Commands,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+@app.callback()
+def _anyview() -> None:
+    """Imitation of a task from a video filmed from any viewpoint.
+
+    Run from the root of the repository. `dvc repro` runs the pipeline; these commands help around it.
+
+    Exit codes: 0 done, 1 the answer is no, 2 bad input, 130 interrupted.
+    """
+
+
+@app.command()
+def doctor(as_json: Annotated[bool, typer.Option("--json", help="Print JSON for a script.")] = False) -> None:
+    """Look whether this machine is fit for the active profile, and say what to do where it is not."""
+    from anyview.doctor import examine
+
+    checks = examine()
+    if as_json:
+        print(json.dumps([asdict(check) | {"ok": not check.advice} for check in checks], indent=2))
+    else:
+        console = Console(highlight=False, soft_wrap=True)
+        for check in checks:
+            mark = "[red]missing[/red]" if check.advice else "[green]ok[/green]     "
+            console.print(f"{mark} {check.name:8}", end=" ")
+            console.print(check.found, markup=False)
+            if check.advice:
+                console.print(f"{'':16} -> {check.advice}", markup=False)
+    if any(check.advice for check in checks):
+        raise typer.Exit(_NOT_FIT)
+
+
+@app.command()
+def profile(
+    name: Annotated[str | None, typer.Argument(metavar="NAME", help="smoke, default, study, thesis.")] = None,
+    check: Annotated[
+        bool, typer.Option("--check", help="Change nothing; exit 1 unless NAME, or any, is active.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for a script.")] = False,
+) -> None:
+    """Set params.yaml to the scale NAME, or without NAME say which one it has.
+
+    Only the keys that profiles set are changed; comments and your other values stay.
+    """
+    from anyview import profiles
+
+    if name is None or check:
+        active = profiles.active_profile()
+        differing = profiles.differences(name or active or profiles.DEFAULT)
+        if as_json:
+            print(json.dumps({"active": active, "profiles": profiles.profile_names()}))
+        else:
+            print(f"active profile: {active or 'none'}")
+            for key, (present, expected) in differing.items():
+                print(f"  {key}: {present}, {name or profiles.DEFAULT} has {expected}")
+        if check and (active is None or active != (name or active)):
+            raise typer.Exit(_NOT_FIT)
+        return
+    changed = profiles.apply_profile(name)
+    if as_json:
+        print(json.dumps({"active": name, "changed": {key: new for key, (_, new) in changed.items()}}))
+    else:
+        for key, (old, new) in changed.items():
+            print(f"{key}: {old} -> {new}")
+        print(f"params.yaml has profile {name}; `dvc repro` runs what that changes")
+
+
+@app.command()
+def clean() -> None:
+    """Empty the scratch folder: checkpoints and decoded frames, which stages make again."""
+    from anyview.runtime.scratch import clear_scratch, scratch_root
+
+    print(f"{scratch_root()}: {clear_scratch() / 1e6:.0f} MB freed")
+
+
+def _load(name: str) -> Any:
+    """The real command ``name`` of another package: the function of that name in its module, or a group."""
+    found: Callable[..., Any] | typer.Typer
+    try:
+        found = getattr(import_module(_ELSEWHERE[name][0]), name)
+    except ModuleNotFoundError as error:
+        raise AnyviewError(f"{name}: {error}; run `make setup`") from None
+    if isinstance(found, typer.Typer):
+        return typer.main.get_group(found)
+    alone = typer.Typer(add_completion=False, context_settings={"help_option_names": ["-h", "--help"]})
+    alone.command(name)(found)
+    return typer.main.get_command(alone)
+
+
+def main() -> NoReturn:
+    """Entry point of the console script."""
+    raise SystemExit(exit_code(_run))
+
+
+def _run() -> None:
+    try:
+        app(prog_name="anyview")
+    except SystemExit as ended:
+        if ended.code:
+            raise
