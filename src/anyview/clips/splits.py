@@ -17,10 +17,11 @@ SPLITS = ("train", "validation", "extreme")
 def split_pairs(clips: pd.DataFrame, seed: int, train: float, validation: float) -> pd.DataFrame:
     """Assign clips to splits; returns a table ``clip, pair, split`` in the order of ``clips``.
 
-    ``clips`` has columns ``clip``, ``pair`` and ``kind``. Clips of kind ``extreme_distractor`` are ``extreme``.
-    The other pairs are ranked by a hash of ``seed`` and the pair's id; validation takes the first ones that fit
-    its share, train the next ones. So a clip that is added moves others only where it displaces them. The
-    first pair of each kind ranks before all others: validation sees every kind that it has room for.
+    ``clips`` has columns ``clip``, ``pair`` and ``kind``. Clips of kind ``extreme_distractor`` are
+    ``extreme``. The other pairs are ranked by a hash of ``seed`` and the pair's id; validation takes the
+    first ones that fit its share, train the next ones. So a clip that is added moves others only where it
+    displaces them. The first pair of each kind ranks before all others: validation sees every kind that
+    it has room for.
 
     ``train`` and ``validation`` are counts of clips, or fractions where below 1. Counts that the clips cannot
     fill are taken as proportions; clips beyond both counts are left out. Raises AnyviewError when train or

@@ -48,11 +48,16 @@ class FrameStore:
     manifest: pd.DataFrame
 
 
+def stored_file(path: Path, clips: int, frames: int) -> StoredFile:
+    """The row of ``files.csv`` for a file of ``clips`` clips of ``frames`` frames each."""
+    return StoredFile(path.name, clips, frames, _sha256(path))
+
+
 def write_clips(path: Path, clips: np.ndarray, rate: float, codec: Codec = "FFV1") -> StoredFile:
     """Write clips, uint8 RGB (n, T, H, W, 3), end to end into one file; returns its row of ``files.csv``."""
     count, length, *picture = clips.shape
     write_video(path, clips.reshape(count * length, *picture), rate, codec)
-    return StoredFile(path.name, count, length, _sha256(path))
+    return stored_file(path, count, length)
 
 
 def write_shard(folder: Path, index: int, clips: np.ndarray, rate: float = 10.0) -> StoredFile:

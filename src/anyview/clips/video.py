@@ -1,7 +1,7 @@
 """Video files in and out: frames are uint8 RGB arrays (T, H, W, 3).
 
-FFV1 in AVI is lossless and keeps simulated frames; XVID keeps real clips, MJPG is what a webcam delivers. The
-stock OpenCV wheel encodes and decodes all three, with the same bytes for any number of cores.
+FFV1 in AVI is lossless and keeps simulated frames; XVID, 4 times smaller, keeps real clips. The stock OpenCV
+wheel encodes and decodes both, with the same bytes for any number of cores.
 """
 
 import os
@@ -13,65 +13,54 @@ from typing import Literal
 import cv2
 import numpy as np
 
+from anyview.clips.ffmpeg import Messages, listening
 from anyview.runtime.errors import AnyviewError
 
-Codec = Literal["FFV1", "XVID", "MJPG"]
-
-# Containers that a camera, a phone or a screen recorder writes. Playlists and image patterns, which make
-# FFmpeg open further files, are left out; "max_pixels" bounds a picture by what its own header claims.
-MAX_PIXELS = 4096 * 2304
-_CAPTURE_OPTIONS = "|".join(
-    (
-        "protocol_whitelist;file",
-        "format_whitelist;avi,mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,mpeg,mpegts,flv,asf,ogg,mjpeg",
-        f"max_pixels;{MAX_PIXELS}",
-    )
-)
-
-
-def quiet_ffmpeg() -> None:
-    """Keep FFmpeg's and OpenCV's own messages off the terminal: damage is reported by our errors."""
-    os.environ["OPENCV_FFMPEG_LOGLEVEL"] = "-8"
-    os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = _CAPTURE_OPTIONS
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+Codec = Literal["FFV1", "XVID"]
 
 
 @contextmanager
-def open_capture(path: Path) -> Iterator[cv2.VideoCapture]:
-    """Open a video file for reading on one thread; raises AnyviewError naming the file."""
+def open_capture(path: Path) -> Iterator[tuple[cv2.VideoCapture, Messages]]:
+    """Open a video file for reading on one thread; yields it with FFmpeg's messages about it.
+
+    Raises AnyviewError naming the file when there is none or it cannot be opened.
+    """
     if not path.is_file():
         raise AnyviewError(f"{path}: no such file")
-    quiet_ffmpeg()
-    # An absolute path cannot be taken for a protocol ("concat:...") or for a device.
-    capture = cv2.VideoCapture(str(path.resolve()), cv2.CAP_FFMPEG, [cv2.CAP_PROP_N_THREADS, 1])
-    try:
-        if not capture.isOpened():
-            raise AnyviewError(f"{path}: not a video that can be opened")
-        yield capture
-    finally:
-        capture.release()
+    with listening() as messages:
+        # An absolute path cannot be taken for a protocol ("concat:...") or for a device.
+        capture = cv2.VideoCapture(str(path.resolve()), cv2.CAP_FFMPEG, [cv2.CAP_PROP_N_THREADS, 1])
+        try:
+            if not capture.isOpened():
+                raise AnyviewError(f"{path}: not a video that can be opened")
+            yield capture, messages
+        finally:
+            capture.release()
 
 
 def read_video(path: Path) -> np.ndarray:
     """All frames of a video, uint8 RGB (T, H, W, 3).
 
-    Raises AnyviewError when the file is missing, cannot be opened, or holds another number of frames than its
-    header declares (it was cut short or altered).
+    Raises AnyviewError when the file is missing, cannot be opened, or is damaged: it holds another number of
+    frames than its header declares, or FFmpeg finds fault with one.
     """
-    with open_capture(path) as capture:
+    with open_capture(path) as (capture, messages):
         declared = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
         frames = []
         while (frame := capture.read()[1]) is not None:
             frames.append(cv2.cvtColor(frame, cv2.COLOR_BGR2RGB))
+        damage = messages.damage()
     if not frames or len(frames) != declared:
         raise AnyviewError(f"{path}: damaged: {len(frames)} of {declared} frames can be decoded")
+    if damage:
+        raise AnyviewError(f"{path}: damaged: {damage}")
     return np.stack(frames)
 
 
 class VideoWriter:
     """Write frames one by one; the file appears under its name only when it is whole.
 
-    >>> with VideoWriter(Path("clip.avi"), (640, 360), fps=30.0, codec="MJPG") as video:
+    >>> with VideoWriter(Path("clip.avi"), (640, 360), fps=30.0, codec="XVID") as video:
     ...     video.write(frame)  # uint8 RGB (360, 640, 3)
     """
 
@@ -81,9 +70,9 @@ class VideoWriter:
         self._path, self._size = path, size
         self._partial = path.with_name(f".{path.stem}.partial{path.suffix}")
         self._written = 0
-        quiet_ffmpeg()
         fourcc = cv2.VideoWriter.fourcc(*codec)
-        self._writer = cv2.VideoWriter(str(self._partial.resolve()), cv2.CAP_FFMPEG, fourcc, fps, size)
+        with listening():
+            self._writer = cv2.VideoWriter(str(self._partial.resolve()), cv2.CAP_FFMPEG, fourcc, fps, size)
         if not self._writer.isOpened():
             self._partial.unlink(missing_ok=True)
             raise AnyviewError(f"{path}: cannot write {codec} video here; is the folder there and writable?")
@@ -99,12 +88,13 @@ class VideoWriter:
     def __enter__(self) -> "VideoWriter":
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        self._writer.release()
+    def __exit__(self, kind: type[BaseException] | None, *details: object) -> None:
+        with listening():
+            self._writer.release()
         try:
             if kind is None:
                 # OpenCV reports no failed write, so that a full disk shows only in what can be read back.
-                with open_capture(self._partial) as capture:
+                with open_capture(self._partial) as (capture, _):
                     stored = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
                 if stored != self._written:
                     raise AnyviewError(

@@ -1,0 +1,44 @@
+"""Stage `film`: the surrogate webcam clips, as a camera would leave them."""
+
+import shutil
+from pathlib import Path
+
+import pandas as pd
+
+from anyview.clips import surrogate
+from anyview.clips.surrogate.film import film, plan, times_file
+from anyview.config import load_params
+from anyview.runtime.errors import AnyviewError, run_stage
+from anyview.runtime.outputs import whole_folder, write_atomically
+from anyview.runtime.progress import track
+from anyview.runtime.scratch import content_key, scratch_folder
+from anyview.runtime.workers import run_units
+
+OUTPUT = Path("data/real/surrogate")
+
+
+def main(arguments: list[str]) -> None:
+    """Film every demonstration; a killed stage continues after the last finished one."""
+    if arguments:
+        raise AnyviewError("usage: python stages/film.py")
+    params = load_params()
+    wanted = params.real.film
+    code = [Path(__file__), *Path(surrogate.__file__).parent.glob("*.py")]
+    scratch = scratch_folder("checkpoints", content_key([params.base.seed, wanted.width], code))
+    demonstrations = plan(wanted.pairs, wanted.singles, wanted.extreme_pairs)
+    units = [(scratch, demonstration, wanted.width, params.base.seed) for demonstration in demonstrations]
+    rows: list[dict[str, str]] = []
+    with track("film", len(units)) as progress:
+        for filmed in run_units(film, units):
+            rows += filmed
+            progress.advance()
+    with whole_folder(OUTPUT) as output:
+        for row in rows:
+            for name in (row["file"], times_file(row["file"])):
+                shutil.copyfile(scratch / name, output / name)
+        write_atomically(output / "manifest.csv", pd.DataFrame(rows).to_csv(index=False))
+    shutil.rmtree(scratch)
+
+
+if __name__ == "__main__":
+    run_stage(main)
