@@ -4,8 +4,9 @@ Enc1(o_t^i) -> z1 reads the expert's frame, Enc2(o_0^j) -> z2 the first frame of
 T(z1, z2) -> z3, and Dec(z3, skips of Enc2(o_0^j)) is the expert's frame as the target context would show it.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal, cast
 
 import numpy as np
 import torch
@@ -85,7 +86,7 @@ class Encoder(nn.Module):
             for before, (after, stride) in zip(channels, architecture.encoder, strict=False)
         )
         side = image_size // architecture.stride
-        self.hidden = nn.Linear(channels[-1] * side * side, architecture.width)
+        self.hidden = nn.Linear(side * side * channels[-1], architecture.width)
         self.output = nn.Linear(architecture.width, architecture.width)
         self.dropout = nn.Dropout(architecture.dropout)
 
@@ -93,10 +94,10 @@ class Encoder(nn.Module):
         maps = []
         x = frames
         for convolution in self.convolutions:
-            x = F.leaky_relu(convolution(x), _LEAK)
+            x = _activate(convolution(x))
             maps.append(x)
-        hidden = self.dropout(F.leaky_relu(self.hidden(x.flatten(1)), _LEAK))
-        return self.output(hidden), maps
+        flat = x.movedim(1, -1).flatten(1)  # (row, column, channel): no copy in channels_last
+        return self.output(self.dropout(_activate(self.hidden(flat)))), maps
 
 
 class Translation(nn.Module):
@@ -109,36 +110,68 @@ class Translation(nn.Module):
         self.dropout = nn.Dropout(architecture.dropout)
 
     def forward(self, z1: Tensor, z2: Tensor) -> Tensor:
-        hidden = self.dropout(F.leaky_relu(self.hidden(torch.cat((z1, z2), dim=1)), _LEAK))
-        return self.output(hidden)
+        return self.output(self.dropout(_activate(self.hidden(torch.cat((z1, z2), dim=1)))))
+
+
+class SkipConvolution(nn.ConvTranspose2d):
+    """Fractional convolution over the concatenation of the layer below and Enc2's map of equal size.
+
+    It is linear, so the two parts are convolved apart and added: the map's part is then computed once for
+    everything that is decoded in the same context.
+    """
+
+    def __init__(self, below: int, skip: int, channels: int, stride: int):
+        super().__init__(below + skip, channels, _KERNEL, stride, _KERNEL // 2, output_padding=stride - 1)
+        self._below = below
+
+    def share(self, skip: Tensor) -> Tensor:
+        """The part of ``skip``, the bias with it."""
+        return self._convolve(skip, self.weight[self._below :], self.bias)
+
+    def forward(self, x: Tensor, share: Tensor) -> Tensor:  # type: ignore[override]
+        """The layer's output for ``x`` (N, ...) and the ``share`` (K, ...) of K contexts, row n modulo K."""
+        own = self._convolve(x, self.weight[: self._below], None)
+        if len(share) != len(own):
+            share = share.repeat(len(own) // len(share), 1, 1, 1)
+        return own.add_(share)
+
+    def _convolve(self, x: Tensor, weight: Tensor, bias: Tensor | None) -> Tensor:
+        stride = self.stride[0]
+        return F.conv_transpose2d(x, weight, bias, stride, _KERNEL // 2, stride - 1)
 
 
 class Decoder(nn.Module):
-    """A connected layer and four fractional convolutions, each of them fed Enc2's map of equal size too."""
+    """A connected layer and four fractional convolutions with skips: z (N, width) -> (N, 3, H, W)."""
 
     def __init__(self, architecture: Architecture, image_size: int):
         super().__init__()
         self._side = image_size // architecture.stride
         skips = [count for count, _ in reversed(architecture.encoder)]
         inputs = [skips[0], *(count for count, _ in architecture.decoder)]
-        self.hidden = nn.Linear(architecture.width, skips[0] * self._side**2)
+        self.hidden = nn.Linear(architecture.width, self._side**2 * skips[0])
         self.dropout = nn.Dropout(architecture.dropout)
         self.convolutions = nn.ModuleList(
-            nn.ConvTranspose2d(
-                before + skip, after, _KERNEL, stride, padding=_KERNEL // 2, output_padding=stride - 1
-            )
-            for before, skip, (after, stride) in zip(inputs, skips, architecture.decoder, strict=False)
+            SkipConvolution(below, skip, channels, stride)
+            for below, skip, (channels, stride) in zip(inputs, skips, architecture.decoder, strict=False)
         )
 
-    def forward(self, z: Tensor, skips: list[Tensor]) -> Tensor:
-        x = self.dropout(F.leaky_relu(self.hidden(z), _LEAK)).unflatten(1, (-1, self._side, self._side))
-        for index, convolution in enumerate(self.convolutions):
-            skip = skips[-1 - index]
-            skip = skip.repeat(len(z) // len(skip), 1, 1, 1)
-            x = convolution(torch.cat((x, skip), dim=1))
-            if index < len(self.convolutions) - 1:
-                x = F.leaky_relu(x, _LEAK)
-        return x
+    def shares(self, skips: list[Tensor]) -> list[Tensor]:
+        """What Enc2's maps add to each convolution, for ``forward``."""
+        layers = cast(Iterable[SkipConvolution], self.convolutions)
+        return [layer.share(skip) for layer, skip in zip(layers, reversed(skips), strict=True)]
+
+    def forward(self, z: Tensor, shares: list[Tensor]) -> Tensor:
+        hidden = self.dropout(_activate(self.hidden(z)))
+        x = hidden.unflatten(1, (self._side, self._side, -1)).movedim(-1, 1)
+        *layers, last = zip(self.convolutions, shares, strict=True)
+        for convolution, share in layers:
+            x = _activate(convolution(x, share))
+        convolution, share = last
+        return convolution(x, share)
+
+
+def _activate(x: Tensor) -> Tensor:
+    return F.leaky_relu(x, _LEAK, inplace=True)
 
 
 class ContextTranslator(nn.Module):
@@ -149,7 +182,7 @@ class ContextTranslator(nn.Module):
 
     def __init__(self, architecture: ArchitectureName, image_size: int):
         super().__init__()
-        if architecture not in get_args(ArchitectureName):
+        if architecture not in ARCHITECTURES:
             raise AnyviewError(f"architecture {architecture!r}: must be one of {', '.join(ARCHITECTURES)}")
         layers = ARCHITECTURES[architecture]
         if image_size < layers.stride or image_size % layers.stride:
@@ -187,4 +220,4 @@ class ContextTranslator(nn.Module):
 
         Row n is decoded in context n modulo K: one context serves a whole clip, or a batch two decodings.
         """
-        return self.decoder(z, skips)
+        return self.decoder(z, self.decoder.shares(skips))
