@@ -18,7 +18,7 @@ def end_with_parent() -> None:
     """End this process when its parent ends: SIGTERM, then, should that not be enough, SIGKILL.
 
     ``dvc`` starts a stage through a shell, which outlives a killed ``dvc``. So a thread watches the parent
-    and, where that is ``dvc``'s shell, ``dvc`` too. On Linux the kernel also reports the parent's end at once.
+    and, where that is ``dvc``'s shell, ``dvc`` too. On Linux the kernel reports the parent's end at once.
     """
     parent = os.getppid()
     if sys.platform.startswith("linux"):

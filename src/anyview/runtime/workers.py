@@ -29,8 +29,8 @@ def run_units(function: Callable[..., T], units: Sequence[tuple[Any, ...]]) -> I
     """Yield ``function(*unit)`` for every unit, in order, as results arrive.
 
     A unit must not depend on how many workers there are, and computes with a fixed number of threads: then
-    results have the same bytes for any number of workers. On a cluster a unit may run twice, because one whose
-    node dies is tried again elsewhere; and every node must see the same working directory and scratch folder.
+    results have the same bytes for any number of workers. On a cluster a unit may run twice, because one
+    whose node dies is tried again elsewhere, and every node must see the same working directory and scratch.
     """
     backend = os.environ.get("ANYVIEW_BACKEND", "local")
     if backend not in ("local", "ray"):
@@ -50,8 +50,8 @@ def _run_locally(function: Callable[..., T], units: Sequence[tuple[Any, ...]]) -
         yield from parallel(joblib.delayed(_local_unit)(function, unit) for unit in units)
     except TerminatedWorkerError:
         raise AnyviewError(
-            "a worker process was killed, perhaps for want of memory; run the same command again to continue, with "
-            "a smaller ANYVIEW_WORKERS if it happens again"
+            "a worker process was killed, perhaps for want of memory; run the same command again to continue, "
+            "with fewer ANYVIEW_WORKERS if it happens again"
         ) from None
 
 

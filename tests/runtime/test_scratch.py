@@ -1,0 +1,49 @@
+from pathlib import Path
+
+import pytest
+
+from anyview.runtime.scratch import (
+    clear_scratch,
+    content_key,
+    scratch_folder,
+    scratch_root,
+    scratch_size,
+)
+
+
+def test_the_key_follows_values_names_and_bytes(tmp_path):
+    one, two = tmp_path / "one.py", tmp_path / "two.py"
+    one.write_text("1")
+    two.write_text("2")
+    key = content_key({"seed": 1, "cell": "ours"}, [one, two])
+    assert content_key({"cell": "ours", "seed": 1}, [two, one]) == key
+    keys = {key, content_key({"seed": 2, "cell": "ours"}, [one, two]), content_key({"seed": 1}, [one, two])}
+    keys.add(content_key({"seed": 1, "cell": "ours"}, [one]))
+    two.write_text("3")
+    keys.add(content_key({"seed": 1, "cell": "ours"}, [one, two]))
+    assert len(keys) == 5
+
+
+def test_size_and_clear(scratch):
+    bystander = scratch / "not-ours"
+    bystander.write_text("keep me")
+    (scratch_folder("frames", "abc") / "frames.npy").write_bytes(b"x" * 100_000)
+    (scratch_folder("checkpoints", "def") / "checkpoint-a").write_bytes(b"x" * 100_000)
+    assert 200_000 <= scratch_size() < 250_000
+    assert clear_scratch() >= 200_000
+    assert scratch_size() == 0
+    assert bystander.read_text() == "keep me"
+
+
+def test_the_folder_is_absolute_and_may_start_at_home(monkeypatch):
+    monkeypatch.setenv("ANYVIEW_SCRATCH", "here")
+    assert scratch_root() == Path.cwd() / "here"
+    monkeypatch.setenv("ANYVIEW_SCRATCH", "~/there")
+    assert scratch_root() == Path.home() / "there"
+    monkeypatch.setenv("ANYVIEW_SCRATCH", "")
+    assert scratch_root() == Path.home() / ".cache" / "anyview"
+
+
+def test_only_known_kinds(scratch):
+    with pytest.raises(ValueError, match="scratch kinds"):
+        scratch_folder("policies", "abc")

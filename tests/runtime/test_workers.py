@@ -1,0 +1,58 @@
+import sys
+from pathlib import Path
+
+import pytest
+
+from anyview.runtime.errors import AnyviewError
+from anyview.runtime.workers import run_units
+
+sys.path.insert(0, str(Path(__file__).parent))
+from units import die, draw, queue, refuse
+
+UNITS = [(number,) for number in range(5)]
+
+
+@pytest.fixture(params=["1", "2"])
+def workers(request, monkeypatch) -> str:
+    monkeypatch.setenv("ANYVIEW_WORKERS", request.param)
+    return request.param
+
+
+def test_results_come_in_order_with_the_same_bytes(workers):
+    assert list(run_units(draw, UNITS)) == [draw(number) for (number,) in UNITS]
+
+
+def test_results_come_as_they_are_ready(workers, tmp_path):
+    """The first is there while the others still wait for the gate to open."""
+    gate = tmp_path / "gate"
+    results = run_units(queue, [(str(gate), number) for number in range(4)])
+    assert next(results) == 0
+    gate.touch()
+    assert list(results) == [1, 2, 3]
+
+
+def test_a_user_error_in_a_worker_is_the_users(workers):
+    with pytest.raises(AnyviewError, match=r"^clip-2.avi: cut short$"):
+        list(run_units(refuse, UNITS))
+
+
+def test_a_killed_worker_is_told(monkeypatch):
+    monkeypatch.setenv("ANYVIEW_WORKERS", "2")
+    with pytest.raises(AnyviewError, match="a worker process was killed"):
+        list(run_units(die, UNITS))
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("ANYVIEW_BACKEND", "cloud"), ("ANYVIEW_WORKERS", "0"), ("ANYVIEW_WORKERS", "two")]
+)
+def test_impossible_settings_are_named(monkeypatch, name, value):
+    monkeypatch.setenv(name, value)
+    with pytest.raises(AnyviewError, match=f"{name}={value}: must be"):
+        list(run_units(draw, UNITS))
+
+
+def test_ray_has_to_be_installed(monkeypatch):
+    monkeypatch.setenv("ANYVIEW_BACKEND", "ray")
+    monkeypatch.setitem(sys.modules, "ray", None)
+    with pytest.raises(AnyviewError, match="Ray is not installed"):
+        list(run_units(draw, UNITS))
