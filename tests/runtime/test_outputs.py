@@ -34,9 +34,14 @@ def test_a_new_folder_replaces_all_of_the_old_one(tmp_path):
 def test_an_error_leaves_the_old_folder_alone(tmp_path, error):
     with whole_folder(tmp_path / "cell") as folder:
         (folder / "old").touch()
-    with pytest.raises(error), whole_folder(tmp_path / "cell") as folder:
-        (folder / "half").touch()
-        raise error
+
+    def fail() -> None:
+        with whole_folder(tmp_path / "cell") as folder:
+            (folder / "half").touch()
+            raise error
+
+    with pytest.raises(error):
+        fail()
     assert names(tmp_path) == ["cell"]
     assert names(tmp_path / "cell") == ["old"]
 

@@ -1,0 +1,151 @@
+import copy
+import random
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from anyview.config import Params, load_params, parse_params, read_yaml
+from anyview.runtime.errors import AnyviewError
+
+PARAMS = Path(__file__).parents[1] / "params.yaml"
+VALUES = read_yaml(PARAMS)
+
+
+def leaves(tree: Any, path: tuple[str, ...] = ()):
+    if isinstance(tree, dict):
+        for key, branch in tree.items():
+            yield from leaves(branch, (*path, key))
+    else:
+        yield path
+
+
+LEAVES = list(leaves(VALUES))
+
+
+def changed(path: tuple[str, ...], value: Any) -> dict:
+    values = copy.deepcopy(VALUES)
+    branch = values
+    for key in path[:-1]:
+        branch = branch[key]
+    branch[path[-1]] = value
+    return values
+
+
+def refusal(read: Callable[[], Params]) -> str | None:
+    """What a user would be told, in one line; None where the params are sound."""
+    try:
+        assert isinstance(read(), Params)
+    except AnyviewError as error:
+        said = str(error)
+    else:
+        return None
+    assert "\n" not in said
+    return said
+
+
+def test_the_committed_params_are_sound():
+    params = load_params(PARAMS)
+    assert params.base.seed == VALUES["base"]["seed"]
+    assert params.imitation.cells.keys() == VALUES["imitation"]["cells"].keys()
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "said"),
+    [
+        ("base.seed", -1, "base.seed: Input should be greater than or equal to 0, got -1"),
+        ("base.sead", 1, "base.sead: unknown key"),
+        (
+            "simulate.diverse.demos",
+            "many",
+            "simulate.diverse.demos: Input should be a valid integer, got 'many'",
+        ),
+        ("simulate.diverse.demos", True, "simulate.diverse.demos: Input should be a valid integer, got True"),
+        ("sim.image_size", 65, "sim.image_size: Input should be 32, 64 or 128, got 65"),
+        ("imitation.ddpg.discount", 1.0, "imitation.ddpg.discount: Input should be less than 1, got 1.0"),
+        (
+            "imitation.cells.ours.learner",
+            "ppo",
+            "imitation.cells.ours.learner: Input should be 'ddpg' or 'trpo'",
+        ),
+        ("translation.cells.sim.iterations", 0, "translation.cells.sim.iterations: Input should be greater"),
+        (
+            "real.film.width",
+            100_000,
+            "real.film.width: Input should be less than or equal to 1920, got 100000",
+        ),
+        ("sim", None, "sim: Input should be a valid dictionary"),
+    ],
+)
+def test_an_impossible_value_is_named(path, value, said):
+    with pytest.raises(AnyviewError) as caught:
+        parse_params(changed(tuple(path.split(".")), value))
+    assert str(caught.value).startswith(f"params.yaml: {said}")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_missing_key_is_named():
+    values = copy.deepcopy(VALUES)
+    del values["imitation"]["reward"]["phi"]
+    with pytest.raises(AnyviewError, match=r"^params.yaml: imitation.reward.phi: missing key$"):
+        parse_params(values)
+
+
+def test_further_mistakes_are_counted():
+    values = changed(("base", "seed"), -1)
+    values["imitation"]["runs"] = 0
+    with pytest.raises(AnyviewError, match=r"\(and 1 more\)$"):
+        parse_params(values)
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    path=st.sampled_from(LEAVES),
+    value=st.none()
+    | st.text(max_size=4)
+    | st.lists(st.integers(-2, 2), max_size=2)
+    | st.dictionaries(st.text(max_size=3), st.integers(), max_size=2)
+    | st.floats()
+    | st.integers(-(10**20), 10**20),
+)
+def test_any_value_is_taken_or_refused_in_one_line(path, value):
+    said = refusal(lambda: parse_params(changed(path, value)))
+    assert said is None or ".".join(path) in said
+
+
+@pytest.mark.parametrize(
+    "content", [b"a: [1", b"a: b: c", b"\xff\xfe", b"- 1\n- 2", b"", b"\t", b"a: &x *x", b"1"]
+)
+def test_a_file_that_is_no_params_is_named(tmp_path, content):
+    path = tmp_path / "params.yaml"
+    path.write_bytes(content)
+    with pytest.raises(AnyviewError, match=r"params\.yaml: ") as caught:
+        load_params(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(AnyviewError, match="no such file; run from the root of the repository"):
+        load_params(tmp_path / "params.yaml")
+
+
+def test_mutated_files_are_taken_or_refused_in_one_line(tmp_path):
+    content = PARAMS.read_bytes()
+    rng = random.Random(0)
+    path = tmp_path / "params.yaml"
+    for _ in range(25):
+        mutant = bytearray(content)
+        for _ in range(rng.randint(1, 3)):
+            place = rng.randrange(len(mutant))
+            mutant[place : place + rng.randrange(3)] = rng.randbytes(rng.randrange(3))
+        path.write_bytes(mutant)
+        refusal(lambda: load_params(path))
+
+
+def test_numbers_are_read_as_dvc_reads_them(tmp_path):
+    path = tmp_path / "numbers.yaml"
+    path.write_text("rate: 1e-3\nflag: no\n")
+    assert read_yaml(path) == {"rate": 0.001, "flag": "no"}
