@@ -1,0 +1,68 @@
+"""The translator's losses, on the thesis's scale.
+
+Its loss values fit L_tr and L_rec as half the sum of squares over a batch of 100 frames, and L_align as 1,000
+times the mean (inferred: the thesis does not say). So the scale stays the same for any batch size here.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from anyview.config import LossWeights
+from anyview.translation.network import ContextTranslator
+
+FRAME_SCALE = 100 / 2
+ALIGNMENT_SCALE = 1000
+
+NAMES = ("translation", "reconstruction", "alignment")
+
+
+@dataclass(frozen=True)
+class Losses:
+    """L_tr, L_rec and L_align of a batch, scalars; None where a loss was left out."""
+
+    translation: Tensor | None
+    reconstruction: Tensor | None
+    alignment: Tensor | None
+
+    def total(self, weights: LossWeights) -> Tensor:
+        """L = w_tr L_tr + w_rec L_rec + w_align L_align of the losses that are there."""
+        parts = [getattr(weights, name) * loss for name in NAMES if (loss := getattr(self, name)) is not None]
+        return sum(parts[1:], parts[0])
+
+
+def frame_loss(output: Tensor, target: Tensor) -> Tensor:
+    """50 |output - target|^2, mean over the batch; both (N, 3, H, W) in [-1, 1]."""
+    return F.mse_loss(output.float(), target, reduction="sum") * (FRAME_SCALE / len(target))
+
+
+def alignment_loss(z3: Tensor, z_true: Tensor) -> Tensor:
+    """1,000 times the mean square of z3 - Enc1(o_t^j); both (N, width)."""
+    return F.mse_loss(z3.float(), z_true.float()) * ALIGNMENT_SCALE
+
+
+def batch_losses(
+    model: ContextTranslator,
+    expert: Tensor,
+    context: Tensor,
+    target: Tensor,
+    wanted: LossWeights | None = None,
+) -> Losses:
+    """Losses of o_t^i, o_0^j and o_t^j, each (N, 3, H, W) in [-1, 1].
+
+    With ``wanted`` only the losses whose weight is above 0 are computed. Both passes through Enc1 are one
+    batch, and both decodings share what the decoder makes of the context's skips.
+    """
+    z1, z_true = model.encode_expert(torch.cat((expert, target))).chunk(2)
+    z2, skips = model.encode_context(context)
+    z3 = model.translate(z1, z2)
+    shares = model.decoder.shares(skips)
+    return Losses(
+        frame_loss(model.decoder(z3, shares), target) if wanted is None or wanted.translation else None,
+        frame_loss(model.decoder(z_true, shares), target)
+        if wanted is None or wanted.reconstruction
+        else None,
+        alignment_loss(z3, z_true) if wanted is None or wanted.alignment else None,
+    )
