@@ -6,7 +6,8 @@ from pathlib import Path
 import pandas as pd
 
 from anyview.clips import surrogate
-from anyview.clips.surrogate.film import film, plan, times_file
+from anyview.clips.manifests import times_file
+from anyview.clips.surrogate.film import film, plan
 from anyview.config import load_params
 from anyview.runtime.errors import AnyviewError, run_stage
 from anyview.runtime.outputs import whole_folder, write_atomically

@@ -1,5 +1,6 @@
-"""Manifests: CSV tables that list clips, one a row."""
+"""Manifests: CSV tables that list clips, one a row; and the sidecars with the times of a clip's frames."""
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -8,8 +9,28 @@ import pandas as pd
 from anyview.runtime.errors import AnyviewError
 
 KINDS = ("standard", "distractor", "extreme_view", "extreme_distractor")
+RAW_COLUMNS = ("file", "pair", "camera", "kind")
+VIDEO_SUFFIXES = frozenset(
+    (
+        ".avi",
+        ".mp4",
+        ".mov",
+        ".mkv",
+        ".webm",
+        ".m4v",
+        ".mpg",
+        ".mpeg",
+        ".ts",
+        ".mts",
+        ".flv",
+        ".asf",
+        ".ogv",
+        ".3gp",
+    )
+)
 
-_TEXT = ("clip", "file", "pair", "camera", "kind", "split", "sha256")
+_TEXT = ("clip", "file", "pair", "camera", "kind", "split", "sha256", "reason")
+_CAMERA_WORD = re.compile(r"[-_ .](?:cam(?:era)?[-_ ]?)?(left|right|front|side|top|[a-d]|[1-4])$", re.I)
 
 
 def read_table(path: Path, columns: Sequence[str], unique: str | None = None) -> pd.DataFrame:
@@ -30,3 +51,33 @@ def read_table(path: Path, columns: Sequence[str], unique: str | None = None) ->
         repeated = table[unique][table[unique].duplicated()].iloc[0]
         raise AnyviewError(f"{path}: {unique} {repeated} is listed twice")
     return table
+
+
+def times_file(file: str) -> str:
+    """The name of a recorded clip's sidecar: a table with a column ``seconds``, a row for each frame."""
+    return str(Path(file).with_suffix(".times.csv"))
+
+
+def propose_manifest(folder: Path) -> pd.DataFrame:
+    """A manifest for the videos in a folder that has none, guessed from their names.
+
+    ``push-03-left.mp4`` and ``push-03-right.mp4`` become a pair; a path that contains a kind has it.
+    """
+    rows = []
+    for path in sorted(folder.rglob("*")):
+        if path.suffix.lower() not in VIDEO_SUFFIXES or not path.is_file():
+            continue
+        file = path.relative_to(folder).as_posix()
+        stem = str(Path(file).with_suffix(""))
+        camera = _CAMERA_WORD.search(stem)
+        words = re.sub("[- ]", "_", stem.lower())
+        kind = next((kind for kind in reversed(KINDS) if kind in words), KINDS[0])
+        rows.append(
+            {
+                "file": file,
+                "pair": stem[: camera.start()] if camera else stem,
+                "camera": camera.group(1).lower() if camera else "",
+                "kind": kind,
+            }
+        )
+    return pd.DataFrame(rows, columns=list(RAW_COLUMNS))

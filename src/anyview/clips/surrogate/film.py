@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from anyview.clips.manifests import times_file
 from anyview.clips.surrogate.push import sample_push
 from anyview.clips.surrogate.scene import OTHER_TARGET_COLOURS, TARGET_COLOUR, Scene, View, place_things
 from anyview.clips.surrogate.webcam import Lens, Webcam, frame_times
@@ -55,11 +56,6 @@ def film(folder: Path, demonstration: Demonstration, width: int, seed: int) -> l
         return rows, [name for row in rows for name in (row["file"], times_file(row["file"]))]
 
     return once(folder, demonstration.pair, make)
-
-
-def times_file(file: str) -> str:
-    """The name of the sidecar with the frames' times of a recorded clip."""
-    return str(Path(file).with_suffix(".times.csv"))
 
 
 def _film(folder: Path, demonstration: Demonstration, width: int, seed: int) -> list[dict[str, str]]:

@@ -1,0 +1,149 @@
+"""Reading one raw clip: even frames out of whatever a camera left, or the reason why not."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from anyview.clips.containers import MAX_PIXELS, Damaged, check_container
+from anyview.clips.manifests import read_table, times_file
+from anyview.clips.video import open_capture
+from anyview.config import Ingest
+from anyview.runtime.errors import AnyviewError
+
+LONGEST = 1.5  # a raw clip may be this many times as long as a finished one
+MAX_RATE = 250.0  # frames a second
+MAX_REPEATS = 0.1  # of a clip's frames may show their predecessor again: the camera was a little slow
+STILL_SECONDS = 2.0  # longer without a single changed pixel: the camera hung
+MIN_MOTION = 1.0  # grey levels, the mean over a picture, between the first frame and the most different one
+MIN_CONTRAST = 4.0  # grey levels, standard deviation within a picture
+MIN_COLOUR = 16.0  # between a pixel's channels, at the most colourful hundredth of a clip
+
+
+class Refused(Exception):
+    """Why a clip cannot be used, in words for its owner."""
+
+
+def read_clip(path: Path, limits: Ingest) -> np.ndarray:
+    """The finished frames, uint8 RGB (frames, size, size, 3), of a raw clip; raises ``Refused``.
+
+    Output frame k is the first source frame that comes later than half a source period before k / rate: the
+    nearest one where the camera kept time.
+    """
+    try:
+        check_container(path)
+        frames = _decode(path, _sidecar_times(path), limits)
+    except Damaged as damage:
+        raise Refused(f"damaged: {damage}") from None
+    except AnyviewError as error:
+        raise Refused(str(error).removeprefix(f"{path}: ")) from None
+    except cv2.error:
+        raise Refused("damaged: a frame cannot be decoded") from None
+    _check_content(frames, limits.rate)
+    return frames
+
+
+def _sidecar_times(path: Path) -> np.ndarray | None:
+    """Seconds of every frame, where a sidecar states them."""
+    sidecar = path.with_name(times_file(path.name))
+    if not sidecar.is_file():
+        return None
+    try:
+        times = read_table(sidecar, ["seconds"])["seconds"].to_numpy(float)
+    except (AnyviewError, ValueError):
+        raise Refused(f"{sidecar.name}: not a table of seconds") from None
+    if len(times) < 2 or not np.isfinite(times).all() or (np.diff(times) <= 0).any():
+        raise Refused(f"{sidecar.name}: the times do not increase")
+    return times
+
+
+def _decode(path: Path, sidecar: np.ndarray | None, limits: Ingest) -> np.ndarray:
+    length = limits.frames / limits.rate
+    frames = np.empty((limits.frames, limits.size, limits.size, 3), np.uint8)
+    filled = used = decoded = 0
+    with open_capture(path) as (capture, messages):
+        _check_picture_size(capture)
+        period = _source_period(capture, sidecar, limits.rate)
+        last = 0.0
+        for time in _grab_all(capture, sidecar):
+            decoded += 1
+            if time > LONGEST * length or decoded > LONGEST * length * MAX_RATE:
+                raise Refused(f"longer than {LONGEST * length:g} s")
+            due = min(int((time + period / 2) * limits.rate + 1e-6) + 1, limits.frames)
+            if due > filled:
+                if time - filled / limits.rate > 1.5 / limits.rate + period / 2:
+                    raise Refused(f"no frame between {last:.2f} s and {time:.2f} s")
+                frames[filled:due] = _shrink(capture.retrieve()[1], limits.size)
+                filled, used = due, used + 1
+            last = time
+        declared = capture.get(cv2.CAP_PROP_FRAME_COUNT)
+        damage = messages.damage()
+    if damage or decoded < max(declared - max(2.0, 0.02 * declared), 1):
+        raise Refused(f"damaged: {damage or f'{decoded} of {declared:.0f} frames can be decoded'}")
+    if filled < limits.frames:
+        raise Refused(f"{last + period:.2f} s long, {length:g} s are needed")
+    if used < (1 - MAX_REPEATS) * limits.frames:
+        raise Refused(f"slower than {limits.rate:g} frames a second")
+    return frames
+
+
+def _check_picture_size(capture: cv2.VideoCapture) -> None:
+    width = int(capture.get(cv2.CAP_PROP_FRAME_WIDTH))
+    height = int(capture.get(cv2.CAP_PROP_FRAME_HEIGHT))
+    if width < 1 or height < 1 or width * height > MAX_PIXELS:
+        raise Refused(f"a picture of {width} x {height}")
+
+
+def _grab_all(capture: cv2.VideoCapture, sidecar: np.ndarray | None) -> Iterator[float]:
+    """Grab frame after frame and yield its time: seconds by the sidecar, else from the first frame."""
+    start = last = 0.0
+    decoded = 0
+    while capture.grab():
+        if sidecar is not None and decoded == len(sidecar):
+            raise Refused(f"its sidecar lists {decoded} frames, the clip has more")
+        time = capture.get(cv2.CAP_PROP_POS_MSEC) / 1e3 if sidecar is None else float(sidecar[decoded])
+        if sidecar is None and decoded == 0:
+            start = last = time
+        if time < last:
+            raise Refused("its frames' times run backwards")
+        yield time - start
+        decoded, last = decoded + 1, time
+    if sidecar is not None and decoded != len(sidecar):
+        raise Refused(f"its sidecar lists {len(sidecar)} frames, the clip has {decoded}")
+
+
+def _source_period(capture: cv2.VideoCapture, times: np.ndarray | None, rate: float) -> float:
+    """Usual seconds between source frames, at most the output's period."""
+    if times is not None:
+        return min(float(np.median(np.diff(times))), 1 / rate)
+    fps = capture.get(cv2.CAP_PROP_FPS)
+    return min(1 / fps if fps > 0 else 0.0, 1 / rate)
+
+
+def _shrink(picture: np.ndarray, size: int) -> np.ndarray:
+    """The middle square of a BGR picture, averaged down to RGB (size, size, 3)."""
+    height, width = picture.shape[:2]
+    side = min(height, width)
+    top, left = (height - side) // 2, (width - side) // 2
+    square = picture[top : top + side, left : left + side]
+    small = cv2.resize(square, (size, size), interpolation=cv2.INTER_AREA)
+    return cv2.cvtColor(small, cv2.COLOR_BGR2RGB)
+
+
+def _check_content(frames: np.ndarray, rate: float) -> None:
+    """Refuse pictures that show nothing, no colour or no motion."""
+    grey = frames.mean(axis=-1, dtype=np.float32)
+    if (grey.std(axis=(1, 2)) < MIN_CONTRAST).mean() > 0.05:
+        raise Refused("black or of one colour")
+    spread = frames.max(axis=-1) - frames.min(axis=-1)
+    if np.percentile(spread, 99) < MIN_COLOUR:
+        raise Refused("without colour")
+    if np.abs(grey - grey[0]).mean(axis=(1, 2)).max() < MIN_MOTION:
+        raise Refused("nothing moves")
+    longest = still = 0
+    for changed in (frames[1:] != frames[:-1]).any(axis=(1, 2, 3)):
+        still = 0 if changed else still + 1
+        longest = max(longest, still)
+    if longest > STILL_SECONDS * rate:
+        raise Refused(f"frozen for {longest / rate:.1f} s")

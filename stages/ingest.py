@@ -1,0 +1,48 @@
+"""Stage `ingest`: raw clips, surrogate or recorded, into small even ones, and the refused with the reason."""
+
+import shutil
+from pathlib import Path
+
+from anyview import clips
+from anyview.clips import ingest
+from anyview.config import load_params
+from anyview.runtime.errors import AnyviewError, run_stage
+from anyview.runtime.outputs import whole_folder
+from anyview.runtime.progress import track
+from anyview.runtime.scratch import content_key, scratch_folder
+from anyview.runtime.workers import run_units
+
+SOURCES = {"surrogate": Path("data/real/surrogate"), "recorded": Path("data/real/raw")}
+OUTPUT = Path("data/real/clips")
+
+
+def main(arguments: list[str]) -> None:
+    """Ingest every clip; a killed stage continues after the last finished one."""
+    if arguments:
+        raise AnyviewError("usage: python stages/ingest.py")
+    params = load_params().real
+    source, limits = SOURCES[params.source], params.ingest
+    candidates = ingest.read_candidates(source)
+    code = [Path(__file__), *Path(clips.__file__).parent.glob("*.py")]
+    scratch = scratch_folder("checkpoints", content_key(limits.model_dump(), code))
+
+    verdicts = []
+    units = [(source, scratch, candidate, limits) for candidate in candidates]
+    with track("ingest", len(units)) as progress:
+        for verdict in run_units(ingest.ingest_clip, units):
+            verdicts.append(verdict)
+            progress.advance()
+    verdicts = ingest.settle(candidates, verdicts)
+    if all(verdict.reason for verdict in verdicts):
+        first = source / candidates[0].file
+        raise AnyviewError(f"{first}: {verdicts[0].reason}; none of {len(verdicts)} clips can be used")
+    with whole_folder(OUTPUT) as output:
+        accepted, refused = ingest.publish(output, scratch, candidates, verdicts)
+    shutil.rmtree(scratch)
+    print(
+        f"{accepted} clips accepted, {refused} refused" + (f" (see {OUTPUT}/refused.csv)" if refused else "")
+    )
+
+
+if __name__ == "__main__":
+    run_stage(main)
