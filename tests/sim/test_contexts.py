@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from anyview.sim.contexts import Context, sample_contexts
 from anyview.sim.kinematics import tool_pose
 from anyview.sim.path import clearance, expert_poses
-from anyview.sim.scene import ARENA_CENTRE, ARENA_RADIUS, GOAL_COLOUR, JOINT_RANGE, OBJECT_COLOUR
+from anyview.sim.scene import ARENA_CENTRE, ARENA_RADIUS, GOAL_COLOUR, JOINT_RANGE, OBJECT_COLOUR, SEAT
 
 
 @settings(max_examples=8, deadline=None)
@@ -55,6 +55,6 @@ def test_the_path_pushes_from_behind_the_object_to_the_goal() -> None:
     )
     poses = expert_poses(arm, start, goal)
     np.testing.assert_allclose(poses[:, 0], tool_pose(arm), atol=1e-12)
-    seat = poses[:, -1, :2] + 0.125 * np.stack([np.cos(poses[:, -1, 2]), np.sin(poses[:, -1, 2])], -1)
+    seat = poses[:, -1, :2] + SEAT * np.stack([np.cos(poses[:, -1, 2]), np.sin(poses[:, -1, 2])], -1)
     np.testing.assert_allclose(seat, goal, atol=1e-12)
     assert (np.diff(poses[:, 42:], axis=1) == 0).all()  # rest at the end

@@ -23,7 +23,7 @@ DISTRACTORS = 5
 
 # The cup, in the tool's frame (x forward): a crossbar and two splayed fingers, capsules of FINGER_RADIUS.
 # A pushed disc touches both fingers and centres itself, its middle SEAT ahead of the tool point.
-FINGER_RADIUS = 0.015
+FINGER_RADIUS = 0.02
 CUP = np.array(
     [
         [[0.0, -0.05], [0.0, 0.05]],
@@ -31,7 +31,7 @@ CUP = np.array(
         [[0.0, -0.05], [0.1, -0.125]],
     ]
 )
-SEAT = 0.125
+SEAT = 2 / 15
 
 CONTROL_SECONDS = 0.1  # 10 Hz
 SUBSTEPS = 10
@@ -45,7 +45,7 @@ CAMERA_FOVY = 28.0  # degrees
 _LINK_HEIGHT = 0.15
 _CUP_HEIGHT = 0.05
 _TABLE = "0.56 0.56 0.54 1"
-_ARM = "0.70 0.70 0.67 1"
+_ARM = "0.82 0.82 0.78 1"
 _DARK = "0.12 0.12 0.12 1"
 
 
@@ -99,7 +99,7 @@ def model(control: str) -> mujoco.MjModel:
     </default>
     <default class="link">
       <joint axis="0 0 1" limited="true" damping="1" armature="0.04"/>
-      <geom type="capsule" size="0.025" rgba="{_ARM}" contype="0" conaffinity="0" mass="0.05"/>
+      <geom type="capsule" size="0.03" rgba="{_ARM}" contype="0" conaffinity="0" mass="0.05"/>
     </default>
     <default class="cup">
       <geom type="capsule" size="{FINGER_RADIUS}" mass="0.01" condim="1"
