@@ -56,7 +56,7 @@ def _paths(body: dict[str, Any], values: Any) -> tuple[frozenset[str], frozenset
     """(inputs, outputs) with every ``${...}`` filled in."""
 
     def filled(*keys: str) -> Iterator[str]:
-        for entry in (entry for key in keys for entry in body.get(key, ())):
+        for entry in (entry for key in keys for entry in body.get(key) or ()):
             path = entry if isinstance(entry, str) else next(iter(entry))
             yield _REFERENCE.sub(lambda match: str(_look_up(match[1], values)), path)
 

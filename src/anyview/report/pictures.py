@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-_QUALITY = 82
+_QUALITY = 90
+_LOSSLESS = 101  # OpenCV: above 100
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ def make_film(frames: np.ndarray, alt: str, stride: int = 2) -> Film:
     """A film of every ``stride``-th frame of ``frames``, uint8 RGB (T, H, W, 3)."""
     kept = frames[list(every(frames, stride))]
     count, height, width, _ = kept.shape
-    return Film(webp(kept.reshape(count * height, width, 3)), count, width, height, alt)
+    return Film(webp(kept.reshape(count * height, width, 3), lossless=False), count, width, height, alt)
 
 
 def side_by_side(frames: np.ndarray) -> np.ndarray:
@@ -54,9 +55,13 @@ def side_by_side(frames: np.ndarray) -> np.ndarray:
     return np.concatenate(list(frames), axis=1)
 
 
-def webp(picture: np.ndarray) -> str:
+def webp(picture: np.ndarray, lossless: bool) -> str:
     """``picture``, uint8 RGB (H, W, 3), as a data URI."""
-    return _data_uri("webp", _encode(".webp", picture, [cv2.IMWRITE_WEBP_QUALITY, _QUALITY]))
+    options = [cv2.IMWRITE_WEBP_QUALITY, _LOSSLESS if lossless else _QUALITY]
+    done, content = cv2.imencode(".webp", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR), options)
+    if not done:
+        raise RuntimeError("OpenCV cannot encode WebP")
+    return _data_uri("webp", content.tobytes())
 
 
 def svg_uri(svg: str) -> str:
@@ -66,10 +71,3 @@ def svg_uri(svg: str) -> str:
 
 def _data_uri(kind: str, content: bytes) -> str:
     return f"data:image/{kind};base64,{base64.b64encode(content).decode()}"
-
-
-def _encode(extension: str, picture: np.ndarray, options: list[int]) -> bytes:
-    done, content = cv2.imencode(extension, cv2.cvtColor(picture, cv2.COLOR_RGB2BGR), options)
-    if not done:
-        raise RuntimeError(f"OpenCV cannot encode {extension}")
-    return content.tobytes()

@@ -7,18 +7,28 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from anyview.report.cells import label
-from anyview.report.figures.style import BLUE, DASHES, GREEN, INK, QUIET, SKY, THESIS, VERMILLION, canvas
+from anyview.report import cells as names
+from anyview.report.estimates import Estimate
+from anyview.report.figures.style import (
+    BLUE,
+    DASHES,
+    GREEN,
+    INK,
+    QUIET,
+    SKY,
+    THESIS,
+    VERMILLION,
+    canvas,
+    mathtext,
+)
 
 
 @dataclass(frozen=True)
 class Bar:
-    """A value with its 95% bounds, and what the thesis has for it (None where it is silent)."""
+    """A cell's estimate, and what the thesis has for it (None where it is silent)."""
 
     cell: str
-    value: float
-    low: float
-    high: float
+    estimate: Estimate
     thesis: float | None = None
 
 
@@ -26,8 +36,7 @@ def success(bars: Sequence[Bar]) -> Figure:
     """Success rates with Wilson intervals, and the thesis's rates as diamonds."""
     with canvas(0.36 * len(bars) + 1.0) as (figure, (axis,)):
         places = np.arange(len(bars))
-        values = np.array([bar.value for bar in bars])
-        errors = np.abs(np.array([[bar.low, bar.high] for bar in bars]).T - values)
+        values, errors = _values_and_errors(bars)
         axis.barh(places, 100 * values, height=0.62, color=SKY, label="here")
         axis.errorbar(
             100 * values, places, xerr=100 * errors, fmt="none", ecolor=INK, capsize=3, label="95% (Wilson)"
@@ -46,8 +55,9 @@ def success(bars: Sequence[Bar]) -> Figure:
                 zorder=4,
                 **THESIS,
             )
-        axis.set_yticks(places, [label(bar.cell) for bar in bars])
-        axis.set(xlim=(0, 100), xlabel="runs that succeed (%)")
+        axis.spines["left"].set_visible(False)
+        axis.set_yticks(places, [_label(bar.cell) for bar in bars])
+        axis.set(xlim=(-2.5, 100), xlabel="runs that succeed (%)")
         _tidy_rows(axis)
         figure.legend(loc="outside upper right", ncols=3)
         return figure
@@ -58,14 +68,14 @@ def differences(bars: Sequence[Bar]) -> Figure:
     with canvas(0.34 * len(bars) + 1.0) as (figure, (axis,)):
         axis.axvline(0, color=QUIET, linewidth=1)
         for place, bar in enumerate(bars):
-            color = VERMILLION if bar.low > 0 else GREEN if bar.high < 0 else QUIET
-            marker = ">" if bar.low > 0 else "<" if bar.high < 0 else "o"
-            axis.plot([100 * bar.low, 100 * bar.high], [place, place], color=color, linewidth=2.2)
-            axis.plot(100 * bar.value, place, marker=marker, color=color, markersize=7)
-        axis.set_yticks(range(len(bars)), [label(bar.cell) for bar in bars])
-        axis.set(
-            xlabel="final distance minus that of ours (cm), mean and 95%", title="Nearer  ←  ours  →  farther"
-        )
+            size = bar.estimate
+            color, marker = (
+                (VERMILLION, ">") if size.low > 0 else (GREEN, "<") if size.high < 0 else (QUIET, "o")
+            )
+            axis.plot([100 * size.low, 100 * size.high], [place, place], color=color, linewidth=2.2)
+            axis.plot(100 * size.value, place, marker=marker, color=color, markersize=7)
+        axis.set_yticks(range(len(bars)), [_label(bar.cell) for bar in bars])
+        axis.set(xlabel="cm farther than ours (mean, 95%)", title="Nearer  ←  ours  →  farther")
         _tidy_rows(axis)
         return figure
 
@@ -78,7 +88,7 @@ def learning(
     Each table has columns ``iteration, run`` and ``measure``.
     """
     rows = -(-len(curves) // 2)
-    with canvas(1.55 * rows + 0.5, rows=1) as (figure, (whole,)):
+    with canvas(1.3 * rows + 0.5) as (figure, (whole,)):
         whole.remove()
         grid = figure.subplots(rows, 2, sharex=True, sharey=True, squeeze=False)
         for axis, (cell, curve) in zip(grid.flat, curves.items(), strict=False):
@@ -90,7 +100,7 @@ def learning(
                 quartiles.index, quartiles[0.25], quartiles[0.75], color=SKY, alpha=0.45, linewidth=0
             )
             axis.plot(quartiles.index, quartiles[0.5], color=BLUE)
-            axis.set_title(label(cell), fontsize=9, fontweight="normal")
+            axis.set_title(_label(cell), fontsize=9, fontweight="normal")
         for axis in list(grid.flat)[len(curves) :]:
             axis.set_visible(False)
         figure.supxlabel("iteration", fontsize=9.5)
@@ -112,8 +122,8 @@ def returns(tables: Mapping[str, pd.DataFrame]) -> Figure:
             for column, (name, marker, color) in styles.items():
                 share = ((table[column] - table["return_still"]) / scale).mean()
                 axis.plot(share, place, marker, color=color, markersize=7, label=name if place == 0 else None)
-        axis.set_yticks(range(len(tables)), [label(cell) for cell in tables])
-        axis.set(xlabel="return: 0 standing still, 1 the expert's own motion")
+        axis.set_yticks(range(len(tables)), [_label(cell) for cell in tables])
+        axis.set(xlabel="return (0: standing still, 1: expert)")
         _tidy_rows(axis)
         figure.legend(loc="outside upper right", ncols=2)
         return figure
@@ -126,8 +136,7 @@ def factorial(bars: Mapping[tuple[str, str], Bar]) -> Figure:
         for index, learner in enumerate(("TRPO", "DDPG")):
             cells = [bars[context, learner] for context in contexts]
             places = np.arange(2) + 0.04 * (index - 0.5)
-            values = 100 * np.array([bar.value for bar in cells])
-            errors = np.abs(100 * np.array([[bar.low, bar.high] for bar in cells]).T - values)
+            values, errors = (100 * array for array in _values_and_errors(cells))
             color, dash = (VERMILLION, BLUE)[index], DASHES[1 - index]
             axis.errorbar(
                 places, values, yerr=errors, color=color, linestyle=dash, marker="os"[index], capsize=3
@@ -140,6 +149,17 @@ def factorial(bars: Mapping[tuple[str, str], Bar]) -> Figure:
         axis.set_ylim(bottom=0)
         axis.grid(axis="x", visible=False)
         return figure
+
+
+def _label(cell: str) -> str:
+    return mathtext(names.label(cell))
+
+
+def _values_and_errors(bars: Sequence[Bar]) -> tuple[np.ndarray, np.ndarray]:
+    """Values (n,), and how far their bounds lie below and above them (2, n)."""
+    values = np.array([bar.estimate.value for bar in bars])
+    bounds = np.array([[bar.estimate.low, bar.estimate.high] for bar in bars]).T
+    return values, np.abs(bounds - values)
 
 
 def _tidy_rows(axis) -> None:

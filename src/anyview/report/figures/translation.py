@@ -3,9 +3,10 @@
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter, NullLocator
 
 from anyview.report import thesis
-from anyview.report.figures.style import BLUE, INK, QUIET, SKY, THESIS, canvas
+from anyview.report.figures.style import BLUE, INK, QUIET, SKY, THESIS, WIDTH, canvas
 from anyview.report.pictures import Strip
 
 
@@ -34,7 +35,14 @@ def training(curve: pd.DataFrame, reference: thesis.TrainingRun) -> Figure:
             axis.plot(*zip(*points, strict=True), linestyle="none", label="thesis", **THESIS)
             axis.set(title=title, yscale="log", ylabel="loss, batch of 100")
             axis.legend()
+            axis.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            axis.yaxis.set_major_formatter("{x:,.0f}")
+            axis.yaxis.set_minor_formatter(NullFormatter())
         axes[1].set_xscale("symlog", linthresh=100)
+        axes[1].set_xlim(-8, 1.3 * max(reference.iterations, curve["iteration"].max()))
+        axes[1].set_xticks([0, 50, 100, 1000, 10_000])
+        axes[1].xaxis.set_major_formatter("{x:,.0f}")
+        axes[1].xaxis.set_minor_locator(NullLocator())
         axes[1].set_xlabel("iteration (linear to 100, then logarithmic)")
         return figure
 
@@ -57,7 +65,7 @@ def strip(content: Strip, title: str = "") -> Figure:
     """Frames in rows with their labels and time steps, pixels kept sharp."""
     count = len(content.steps)
     aspect = len(content.rows) / count
-    with canvas(5.2 * aspect + 0.55) as (figure, (axis,)):
+    with canvas(WIDTH * aspect + 0.55) as (figure, (axis,)):
         picture = np.concatenate([np.concatenate(list(frames), axis=1) for _, frames in content.rows])
         height, width = content.rows[0][1].shape[1:3]
         axis.imshow(picture, interpolation="nearest")

@@ -1,0 +1,302 @@
+"""Figures 13 to 18 as exhibits: what the context translator does, beside the thesis's numbers."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pandas as pd
+
+from anyview.report import thesis
+from anyview.report.content import Exhibit, Reel, Section, Table, view
+from anyview.report.estimates import Estimate, Estimator
+from anyview.report.figures import translation as figures
+from anyview.report.figures.style import to_svg
+from anyview.report.inputs import Study, Training, Translation
+from anyview.report.metrics import Tree, extreme_ratio
+from anyview.report.pictures import Strip, make_film, make_strip
+from anyview.report.words import ABSENT, NOT_STATED, number, plural, spread
+
+ADAM, ADADELTA, AUGMENTED, SIM = "real-adam", "real-adadelta", "real-augmented", "sim"
+_REEL_CLIPS = 4
+
+
+def section(study: Study, metrics: Tree) -> Section:
+    """The chapter on the translator."""
+    exhibits = (
+        *_training(study),
+        *_feature_weights(study),
+        *_validation_strip(study, metrics),
+        *_extreme(study, metrics),
+        *_simulation(study, metrics),
+        *_moving(study),
+        *_table(metrics),
+    )
+    text = (
+        "Losses are on the thesis’s scale as far as it can be inferred: half the sum of squares over a "
+        "batch of 100 frames for translation and reconstruction, 1,000 times the mean square for "
+        "alignment, all weights 1. Intervals are over clips, the two views of one demonstration drawn "
+        "together.",
+    )
+    return Section("translator", "The context translator", text, exhibits)
+
+
+def _training(study: Study) -> Iterator[Exhibit]:
+    for cell, figure, reference, optimiser in (
+        (ADAM, 13, thesis.ADAM, "Adam"),
+        (ADADELTA, 14, thesis.ADADELTA, "AdaDelta"),
+    ):
+        if cell not in study.trainings:
+            continue
+        training = study.trainings[cell]
+        last = int(training.curve["iteration"].max())
+        yield Exhibit(
+            f"figure-{figure}",
+            f"Figure {figure}. Training on real clips with {optimiser}",
+            (
+                f"Here {plural(last, 'iteration')}, in the thesis {reference.iterations:,} in "
+                f"{reference.hours:g} hours on a GTX 970. Diamonds are the values that its text states.",
+                *_optimisers(study, cell),
+            ),
+            to_svg(figures.training(training.curve, reference)),
+            comparison=_training_table(training, reference),
+            surrogate=study.surrogate,
+        )
+
+
+def _training_table(training: Training, reference: thesis.TrainingRun) -> Table:
+    rows = []
+    for name, column, stated in (
+        ("Total loss", "loss", reference.total),
+        ("Validation loss", "validation_loss", reference.validation),
+    ):
+        curve = _stated(training, column)
+        by_500 = curve[curve.index <= 500]
+        rows += [
+            (
+                f"{name}, start",
+                NOT_STATED if stated.start is None else number(stated.start),
+                number(curve.iloc[0]),
+            ),
+            (
+                f"{name}, iteration 500",
+                number(stated.at_500),
+                number(by_500.iloc[-1]) if curve.index[-1] >= 500 else ABSENT,
+            ),
+            (
+                f"{name}, minimum",
+                f"{number(stated.minimum)} at {stated.minimum_iteration:,}",
+                f"{number(curve.min())} at {int(curve.idxmin()):,}",
+            ),
+        ]
+    return Table(("", "Thesis", "Here"), tuple(rows))
+
+
+def _stated(training: Training, column: str) -> pd.Series:
+    """A column of the curve where it has a value, by iteration."""
+    return training.curve[["iteration", column]].dropna().set_index("iteration")[column]
+
+
+def _optimisers(study: Study, cell: str) -> Iterator[str]:
+    """Adam against AdaDelta at the last validation that both have reached, as it comes out."""
+    if cell != ADADELTA or ADAM not in study.trainings:
+        return
+    curves = [_stated(study.trainings[name], "validation_loss") for name in (ADAM, ADADELTA)]
+    shared = curves[0].index.intersection(curves[1].index)
+    if len(shared):
+        at = int(shared.max())
+        yield (
+            f"At equal iterations ({at:,}), the validation loss is {number(curves[0][at])} with Adam and "
+            f"{number(curves[1][at])} with AdaDelta; one training each. The thesis’s two minima, "
+            f"{number(thesis.ADAM.validation.minimum)} and {number(thesis.ADADELTA.validation.minimum)}, "
+            "are not at equal iterations."
+        )
+
+
+def _feature_weights(study: Study) -> Iterator[Exhibit]:
+    if ADAM not in study.translations:
+        return
+    weights = study.translations[ADAM].feature_weights
+    means = []
+    for first, last, stated in thesis.FEATURE_WEIGHTS:
+        here = number(weights[first : last + 1].mean()) if len(weights) == thesis.FRAMES else ABSENT
+        means.append((f"Frames {first} to {last}", f"{stated:g}" if stated else "about 0", here))
+    yield Exhibit(
+        "figure-15",
+        "Figure 15. How much each frame of the expert’s clip matters",
+        (
+            "Permutation importance: how much the translation loss rises when a frame is replaced by "
+            "frames of other times. Ours sum to 1; the thesis’s values cannot, so only the shapes compare.",
+        ),
+        to_svg(figures.feature_weights(weights)),
+        comparison=Table(("Mean weight", "Thesis", "Here"), tuple(means)),
+        surrogate=study.surrogate,
+    )
+
+
+def _validation_strip(study: Study, metrics: Tree) -> Iterator[Exhibit]:
+    if ADAM not in study.translations:
+        return
+    translation = study.translations[ADAM]
+    clip = typical_clip(translation, "validation")
+    loss = float(translation.clips.set_index("clip")["loss"][clip])
+    validation = metrics[ADAM]["validation"]
+    count = len(translation.split("validation"))
+    rows = (
+        ("Loss of the example", number(thesis.STRIP_EXAMPLE_LOSS), number(loss)),
+        (
+            f"Mean loss ({thesis.VALIDATION_CLIPS} clips; {count} here)",
+            number(thesis.VALIDATION_LOSS),
+            _metric(validation, "loss"),
+        ),
+        ("PSNR (dB)", NOT_STATED, _metric(validation, "psnr")),
+        ("SSIM", NOT_STATED, _metric(validation, "ssim")),
+    )
+    yield Exhibit(
+        "figure-16",
+        "Figure 16. A held-out clip: true above translated, every 7th frame",
+        ("The validation clip with the median loss: neither the best nor the worst.",),
+        strip=view(clip_strip(translation, clip)),
+        comparison=Table(("", "Thesis", "Here"), rows),
+        surrogate=study.surrogate,
+    )
+
+
+def _extreme(study: Study, metrics: Tree) -> Iterator[Exhibit]:
+    cells = [cell for cell in (ADAM, AUGMENTED) if "extreme" in metrics.get(cell, {})]
+    if not cells:
+        return
+    estimator = Estimator(study.params.base.seed)
+    ratios = {cell: extreme_ratio(estimator, cell, study.translations[cell]) for cell in cells}
+    rows = [
+        (
+            f"Mean loss, extreme ({cell})",
+            number(thesis.EXTREME_LOSS) if cell == ADAM else ABSENT,
+            _metric(metrics[cell]["extreme"], "loss"),
+        )
+        for cell in cells
+    ]
+    rows += [
+        (
+            f"Extreme over validation, L_tr ({cell})",
+            f"{thesis.EXTREME_RATIO:.1f}" if cell == ADAM else ABSENT,
+            _estimate(ratios[cell]),
+        )
+        for cell in cells
+    ]
+    yield Exhibit(
+        "figure-17",
+        "Figure 17. Extreme distractors that training never saw: the last frame",
+        (
+            "Many objects and a target of another colour. The thesis fails here: its loss is 2.7 times "
+            "that of validation.",
+            *_augmentation(ratios),
+        ),
+        strip=view(_last_frames(study, cells)),
+        comparison=Table(("", "Thesis", "Here"), tuple(rows)),
+        surrogate=study.surrogate,
+    )
+
+
+def _augmentation(ratios: dict[str, Estimate]) -> Iterator[str]:
+    if len(ratios) < 2:
+        return
+    plain, augmented = ratios[ADAM], ratios[AUGMENTED]
+    apart = augmented.high < plain.low or augmented.low > plain.high
+    claim = "their intervals do not overlap" if apart else "their intervals overlap, so no order is claimed"
+    yield (
+        f"Beyond the thesis: augmenting the contexts in training changes the ratio from {_estimate(plain)} "
+        f"to {_estimate(augmented)}; {claim}."
+    )
+
+
+def _simulation(study: Study, metrics: Tree) -> Iterator[Exhibit]:
+    if SIM not in study.translations:
+        return
+    translation = study.translations[SIM]
+    validation = metrics[SIM]["validation"]
+    rows = (
+        ("Mean loss", number(thesis.SIMULATION_LOSS), _metric(validation, "loss")),
+        ("PSNR (dB)", NOT_STATED, _metric(validation, "psnr")),
+        ("SSIM", NOT_STATED, _metric(validation, "ssim")),
+    )
+    yield Exhibit(
+        "figure-18",
+        "Figure 18. Simulation: a held-out demonstration, true above translated",
+        (
+            "The clip with the median loss of "
+            f"{plural(len(translation.split('validation')), 'held-out clip')}. The thesis shows only the "
+            "last frame, and its pictures have another size and scene.",
+        ),
+        strip=view(clip_strip(translation, typical_clip(translation, "validation"))),
+        comparison=Table(("", "Thesis", "Here"), rows),
+    )
+
+
+def _moving(study: Study) -> Iterator[Exhibit]:
+    reels = []
+    for cell in (SIM, ADAM, AUGMENTED):
+        if cell not in study.translations:
+            continue
+        translation = study.translations[cell]
+        for split in ("validation", "extreme"):
+            films = tuple(
+                make_film(translation.frames(clip), f"{clip}: true left, translated right")
+                for clip in translation.filmed(split)[:_REEL_CLIPS]
+            )
+            if films:
+                reels.append(Reel(f"{cell}, {split}", films))
+    if reels:
+        yield Exhibit(
+            "moving",
+            "Translated clips, playing",
+            ("The first held-out clips of each set, not picked by how well they came out.",),
+            reels=tuple(reels),
+        )
+
+
+def _table(metrics: Tree) -> Iterator[Exhibit]:
+    rows = []
+    for cell, values in metrics.items():
+        for split in ("validation", "extreme"):
+            if split in values:
+                cells = (_metric(values[split], name) for name in ("loss", "translation", "psnr", "ssim"))
+                rows.append((f"{cell}, {split}" + (" (surrogate)" if values["surrogate"] else ""), *cells))
+    if rows:
+        yield Exhibit(
+            "translators",
+            "Every translator",
+            ("Each is one training: its seed’s luck is part of its row, and of all runs that use it.",),
+            table=Table(("Cell", "Loss", "L_tr", "PSNR (dB)", "SSIM"), tuple(rows)),
+        )
+
+
+def typical_clip(translation: Translation, split: str) -> str:
+    """The clip of median loss among those of ``split`` that were written out as video."""
+    clips = translation.split(split)
+    filmed = clips[clips["clip"].isin(translation.filmed(split))].sort_values("loss", kind="stable")
+    return str(filmed["clip"].iloc[(len(filmed) - 1) // 2])
+
+
+def clip_strip(translation: Translation, clip: str) -> Strip:
+    """True over translated frames of ``clip``."""
+    true, translated = np.split(translation.frames(clip), 2, axis=2)
+    return make_strip([("true", true), ("translated", translated)])
+
+
+def _last_frames(study: Study, cells: list[str]) -> Strip:
+    """The last frame of each extreme clip: the true one, then each cell's translation."""
+    clips = study.translations[cells[0]].filmed("extreme")
+    rows: list[tuple[str, np.ndarray]] = []
+    for cell in cells:
+        lasts = [np.split(study.translations[cell].frames(clip)[-1], 2, axis=1) for clip in clips]
+        if not rows:
+            rows.append(("true", np.stack([last[0] for last in lasts])))
+        rows.append((f"translated ({cell})", np.stack([last[1] for last in lasts])))
+    return Strip(tuple(rows), tuple(range(1, len(clips) + 1)))
+
+
+def _metric(values: Tree, name: str) -> str:
+    return spread(values[name], values[f"{name}_low"], values[f"{name}_high"])
+
+
+def _estimate(estimate: Estimate) -> str:
+    return spread(estimate.value, estimate.low, estimate.high)
