@@ -1,5 +1,6 @@
 """Reading one raw clip: even frames out of whatever a camera left, or the reason why not."""
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -70,7 +71,7 @@ def _decode(path: Path, sidecar: np.ndarray | None, limits: Ingest) -> np.ndarra
             decoded += 1
             if time > LONGEST * length or decoded > LONGEST * length * MAX_RATE:
                 raise Refused(f"longer than {LONGEST * length:g} s")
-            due = min(int((time + period / 2) * limits.rate + 1e-6) + 1, limits.frames)
+            due = min(math.floor((time + period / 2) * limits.rate + 1e-6) + 1, limits.frames)
             if due > filled:
                 if time - filled / limits.rate > 1.5 / limits.rate + period / 2:
                     raise Refused(f"no frame between {last:.2f} s and {time:.2f} s")

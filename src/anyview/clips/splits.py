@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from anyview.clips.manifests import read_table
+from anyview.clips.manifests import KINDS, read_table
 from anyview.runtime.errors import AnyviewError
 
 SPLITS = ("train", "validation", "extreme")
@@ -20,8 +20,8 @@ def split_pairs(clips: pd.DataFrame, seed: int, train: float, validation: float)
     ``clips`` has columns ``clip``, ``pair`` and ``kind``. Clips of kind ``extreme_distractor`` are
     ``extreme``. The other pairs are ranked by a hash of ``seed`` and the pair's id; validation takes the
     first ones that fit its share, train the next ones. So a clip that is added moves others only where it
-    displaces them. The first pair of each kind ranks before all others: validation sees every kind that
-    it has room for.
+    displaces them. The first pair of each kind ranks before all others, ``standard`` first: validation
+    sees every kind that it has room for.
 
     ``train`` and ``validation`` are counts of clips, or fractions where below 1. Counts that the clips cannot
     fill are taken as proportions; clips beyond both counts are left out. Raises AnyviewError when train or
@@ -68,7 +68,8 @@ def _ranked(clips: pd.DataFrame, seed: int) -> list[str]:
     pairs["hash"] = [hashlib.sha256(f"{seed}/{pair}".encode()).hexdigest() for pair in pairs["pair"]]
     pairs = pairs.sort_values("hash", kind="stable")
     later = pairs.duplicated("kind")
-    return [*pairs["pair"][~later], *pairs["pair"][later]]
+    first = pairs[~later].sort_values("kind", key=lambda kinds: kinds.map(KINDS.index))
+    return [*first["pair"], *pairs["pair"][later]]
 
 
 def read_split(path: Path) -> pd.DataFrame:
