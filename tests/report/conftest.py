@@ -52,10 +52,9 @@ class Data:
 
     def translator(self, cell: str, iterations: int = 520, extreme: bool = False, scale: float = 1.0) -> None:
         folder = self._folder("models", cell)
-        steps = np.arange(iterations + 1)
+        steps = np.arange(40, iterations + 1, 40)
         loss = scale * (40_000 * np.exp(-steps / 90) + 4_000)
-        validation = np.where(steps % 40 == 0, 1.05 * loss, np.nan)
-        self._csv(folder / "curve.csv", iteration=steps, loss=loss, validation_loss=validation)
+        self._csv(folder / "curve.csv", iteration=steps, loss=loss, validation_loss=1.05 * loss)
         self._json(folder / "model.json", best_iteration=480, architecture="compact", image_size=SIZE)
         folder = self._folder("translations", cell)
         places = ["validation"] * 6 + ["extreme"] * (4 if extreme else 0)

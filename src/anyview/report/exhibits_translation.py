@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 
 import numpy as np
-import pandas as pd
 
 from anyview.report import thesis
 from anyview.report.content import Exhibit, Reel, Section, Table, view
@@ -53,7 +52,8 @@ def _training(study: Study) -> Iterator[Exhibit]:
             f"Figure {figure}. Training on real clips with {optimiser}",
             (
                 f"Here {plural(last, 'iteration')}, in the thesis {reference.iterations:,} in "
-                f"{reference.hours:g} hours on a GTX 970. Diamonds are the values that its text states.",
+                f"{reference.hours:g} hours on a GTX 970. Diamonds are the values that its text states; "
+                "our total loss is the mean since the validation before.",
                 *_optimisers(study, cell),
             ),
             to_svg(figures.training(training.curve, reference)),
@@ -68,38 +68,27 @@ def _training_table(training: Training, reference: thesis.TrainingRun) -> Table:
         ("Total loss", "loss", reference.total),
         ("Validation loss", "validation_loss", reference.validation),
     ):
-        curve = _stated(training, column)
-        by_500 = curve[curve.index <= 500]
+        curve = training.losses(column)
+        start = NOT_STATED if stated.start is None else number(stated.start)
+        minimum = _at(stated.minimum, stated.minimum_iteration)
+        by_500 = curve[curve.index <= max(500, curve.index[0])]
         rows += [
-            (
-                f"{name}, start",
-                NOT_STATED if stated.start is None else number(stated.start),
-                number(curve.iloc[0]),
-            ),
-            (
-                f"{name}, iteration 500",
-                number(stated.at_500),
-                number(by_500.iloc[-1]) if curve.index[-1] >= 500 else ABSENT,
-            ),
-            (
-                f"{name}, minimum",
-                f"{number(stated.minimum)} at {stated.minimum_iteration:,}",
-                f"{number(curve.min())} at {int(curve.idxmin()):,}",
-            ),
+            (f"{name}, first", start, _at(curve.iloc[0], curve.index[0])),
+            (f"{name}, by iteration 500", number(stated.at_500), _at(by_500.iloc[-1], by_500.index[-1])),
+            (f"{name}, minimum", minimum, _at(curve.min(), curve.idxmin())),
         ]
     return Table(("", "Thesis", "Here"), tuple(rows))
 
 
-def _stated(training: Training, column: str) -> pd.Series:
-    """A column of the curve where it has a value, by iteration."""
-    return training.curve[["iteration", column]].dropna().set_index("iteration")[column]
+def _at(value: float, iteration: int) -> str:
+    return f"{number(value)} at\u00a0{iteration:,}"
 
 
 def _optimisers(study: Study, cell: str) -> Iterator[str]:
     """Adam against AdaDelta at the last validation that both have reached, as it comes out."""
     if cell != ADADELTA or ADAM not in study.trainings:
         return
-    curves = [_stated(study.trainings[name], "validation_loss") for name in (ADAM, ADADELTA)]
+    curves = [study.trainings[name].losses("validation_loss") for name in (ADAM, ADADELTA)]
     shared = curves[0].index.intersection(curves[1].index)
     if len(shared):
         at = int(shared.max())

@@ -36,10 +36,14 @@ class Clips:
 
 @dataclass(frozen=True)
 class Training:
-    """A trained model: ``curve`` has a row per iteration (validation columns NaN between validations)."""
+    """A trained translator: ``curve`` has a row per validation."""
 
     curve: pd.DataFrame
     best_iteration: int
+
+    def losses(self, column: str) -> pd.Series:
+        """A column of the curve by iteration."""
+        return self.curve.set_index("iteration")[column]
 
 
 @dataclass(frozen=True)
@@ -122,8 +126,9 @@ def read_study(data: Path, params: Params) -> Study:
     sets = _present(data / "sim", ("diverse", "narrow"))
     clips = _present(data / "real", ("clips",))
     splits = _present(data / "splits", ("sim-diverse", "sim-narrow", "real"), ".csv")
-    models = _present(data / "models", params.translation.cells)
-    translations = _present(data / "translations", params.translation.cells)
+    translators = [name for name, cell in params.translation.cells.items() if cell.method == "translator"]
+    models = _present(data / "models", translators)
+    translations = _present(data / "translations", translators)
     policies = _present(data / "policies", params.imitation.cells)
     found = (sets, clips, splits, models, translations, policies)
     if not any(found):
@@ -157,7 +162,7 @@ def _clips(folder: Path) -> Clips:
 
 
 def _training(folder: Path) -> Training:
-    curve = _numbers(folder / "curve.csv", ["iteration", "loss"])
+    curve = _numbers(folder / "curve.csv", ["iteration", "loss", "validation_loss"])
     return Training(curve, int(_json(folder / "model.json", "best_iteration")["best_iteration"]))
 
 

@@ -1,4 +1,7 @@
-"""Tables and pictures for ``dvc plots``: wide tables, one column per cell, so that each is one plot."""
+"""Tables and pictures for ``dvc plots``, drawn by the templates in .dvc/plots.
+
+Tables are long, a row per cell and point, so that a plot's declaration in dvc.yaml names no cell.
+"""
 
 from pathlib import Path
 
@@ -20,24 +23,17 @@ _POINTS = 100
 
 def write_plots(folder: Path, study: Study) -> None:
     """Write every table and picture that ``study`` allows into ``folder``."""
-    trainings = {
-        cell: training.curve.dropna(subset="validation_loss").set_index("iteration")["validation_loss"]
-        for cell, training in study.trainings.items()
-        if "validation_loss" in training.curve
-    }
-    _write_curves(folder / "translator_validation_loss.csv", trainings)
+    losses = {cell: training.losses("validation_loss") for cell, training in study.trainings.items()}
     distances = {
         cell: study.evaluations[cell].curve.groupby("iteration")["final_distance"].median()
         for cell in in_order(study.evaluations)
     }
-    _write_curves(folder / "imitation_final_distance.csv", distances)
-    weights = {
-        cell: pd.Series(entry.feature_weights).rename_axis("frame")
-        for cell, entry in study.translations.items()
-    }
-    _write_curves(folder / "feature_weights.csv", weights, points=None)
+    weights = {cell: pd.Series(entry.feature_weights) for cell, entry in study.translations.items()}
+    _write(folder / "validation_loss.csv", _curves(losses, "iteration", "validation_loss"))
+    _write(folder / "final_distance.csv", _curves(distances, "iteration", "final_distance"))
+    _write(folder / "feature_weights.csv", _curves(weights, "frame", "weight"))
     _write(folder / "success.csv", _success(study))
-    _write(folder / "final_distance_differences.csv", _differences(study))
+    _write(folder / "differences.csv", _differences(study))
     for cell, translation in study.translations.items():
         clip = typical_clip(translation, "validation")
         picture = strip(clip_strip(translation, clip), f"{cell}: {clip}")
@@ -46,14 +42,14 @@ def write_plots(folder: Path, study: Study) -> None:
         write_atomically(folder / "idea.png", to_png(strip(idea)))
 
 
-def _write_curves(path: Path, curves: dict[str, pd.Series], points: int | None = _POINTS) -> None:
-    """One column per cell over a shared index, thinned to about ``points`` rows."""
-    if not curves:
-        return
-    table = pd.DataFrame(curves).sort_index()
-    if points is not None:
-        table = table.iloc[sorted({*range(0, len(table), -(-len(table) // points)), len(table) - 1})]
-    _write(path, table.reset_index())
+def _curves(curves: dict[str, pd.Series], x: str, y: str) -> pd.DataFrame:
+    """Columns ``cell``, ``x``, ``y``; each curve thinned to at most ``_POINTS`` points and its last."""
+    parts = []
+    for cell, curve in curves.items():
+        kept = sorted({*range(0, len(curve), -(-len(curve) // _POINTS)), len(curve) - 1})
+        thin = curve.iloc[kept].rename_axis(x).rename(y).reset_index()
+        parts.append(thin.assign(cell=cell)[["cell", x, y]])
+    return pd.concat(parts) if parts else pd.DataFrame()
 
 
 def _success(study: Study) -> pd.DataFrame:
@@ -90,4 +86,9 @@ def _differences(study: Study) -> pd.DataFrame:
 
 def _write(path: Path, table: pd.DataFrame) -> None:
     if len(table):
-        write_atomically(path, table.to_csv(index=False, float_format="%.4g"))
+        write_atomically(path, table.to_csv(index=False, float_format=_rounded))
+
+
+def _rounded(value: float) -> str:
+    """Four significant digits, never in scientific notation for the sizes that occur here."""
+    return f"{float(f'{value:.4g}'):.10g}"

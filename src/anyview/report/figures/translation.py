@@ -13,25 +13,14 @@ from anyview.report.pictures import Strip
 def training(curve: pd.DataFrame, reference: thesis.TrainingRun) -> Figure:
     """Figures 13 and 14: total and validation loss over iterations, and the points that the thesis states.
 
-    ``curve`` has columns ``iteration, loss, validation_loss``; the latter is empty between validations.
+    ``curve`` has columns ``iteration, loss, validation_loss``.
     """
     with canvas(4.6, rows=2, sharex=True) as (figure, axes):
         for axis, column, title, points in (
             (axes[0], "loss", "Total loss", reference.total.points()),
             (axes[1], "validation_loss", "Validation loss", reference.validation.points()),
         ):
-            stated = curve[["iteration", column]].dropna()
-            if column == "loss" and len(stated) > 200:
-                axis.plot(
-                    stated["iteration"],
-                    stated[column],
-                    color=SKY,
-                    linewidth=0.6,
-                    alpha=0.7,
-                    label="one batch",
-                )
-                stated = stated.assign(loss=stated["loss"].rolling(25, center=True, min_periods=1).median())
-            axis.plot(stated["iteration"], stated[column], color=BLUE, label="here")
+            axis.plot(curve["iteration"], curve[column], color=BLUE, marker=".", label="here")
             axis.plot(*zip(*points, strict=True), linestyle="none", label="thesis", **THESIS)
             axis.set(title=title, yscale="log", ylabel="loss, batch of 100")
             axis.legend()
