@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays_of
 
 from anyview.runtime.checkpoints import Checkpoints
+from anyview.runtime.errors import AnyviewError
 
 ARRAYS = st.dictionaries(
     st.text("abcxyz./-", min_size=1, max_size=8),
@@ -119,13 +120,21 @@ def test_a_well_formed_file_of_another_kind_is_refused(folder):
 
 
 def test_due_follows_the_clock(folder, monkeypatch):
-    checkpoints = Checkpoints(folder, every_seconds=60)
+    monkeypatch.setenv("ANYVIEW_CHECKPOINT_SECONDS", "60")
+    checkpoints = Checkpoints(folder)
     assert not checkpoints.due()
     now = time.monotonic()
     monkeypatch.setattr(time, "monotonic", lambda: now + 61)
     assert checkpoints.due()
     checkpoints.save(1, {}, {})
     assert not checkpoints.due()
+
+
+@pytest.mark.parametrize("value", ["soon", "-1", "nan", ""])
+def test_an_impossible_interval_is_named(folder, monkeypatch, value):
+    monkeypatch.setenv("ANYVIEW_CHECKPOINT_SECONDS", value)
+    with pytest.raises(AnyviewError, match=f"ANYVIEW_CHECKPOINT_SECONDS={value}: must be"):
+        Checkpoints(folder)
 
 
 def test_clear_leaves_nothing(folder):

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 import time
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
+from anyview.runtime.errors import AnyviewError
 from anyview.runtime.outputs import write_atomically
 
 _MAGIC = b"anyview-checkpoint-1\n"
@@ -24,16 +26,18 @@ class Checkpoints:
     A checkpoint is a dictionary of numpy arrays and a JSON-serialisable ``state``. The file is the magic
     line, the SHA-256 of the rest, then a safetensors body that carries the state as metadata. A file that is
     cut short or altered fails its checksum and the one before it is used.
+
+    ``ANYVIEW_CHECKPOINT_SECONDS`` says how often one is due (default 60).
     """
 
-    def __init__(self, folder: Path, every_seconds: float = 60.0):
+    def __init__(self, folder: Path):
         self.folder = folder
-        self._every = every_seconds
+        self._every = _seconds()
         self._saved = time.monotonic()
         self._next: str | None = None
 
     def due(self) -> bool:
-        """Whether the last checkpoint is ``every_seconds`` old."""
+        """Whether it is time for the next checkpoint."""
         return time.monotonic() - self._saved >= self._every
 
     def save(self, step: int, arrays: dict[str, np.ndarray], state: dict[str, Any]) -> None:
@@ -60,6 +64,17 @@ class Checkpoints:
     def _newest(self) -> tuple[str, Checkpoint | None]:
         found = [(slot, checkpoint) for slot in _SLOTS if (checkpoint := _read(self.folder / slot))]
         return max(found, key=lambda entry: entry[1][0]) if found else (_SLOTS[1], None)
+
+
+def _seconds() -> float:
+    text = os.environ.get("ANYVIEW_CHECKPOINT_SECONDS", "60")
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = -1
+    if not seconds >= 0:
+        raise AnyviewError(f"ANYVIEW_CHECKPOINT_SECONDS={text}: must be a number of at least 0")
+    return seconds
 
 
 def _other(slot: str) -> str:

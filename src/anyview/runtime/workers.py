@@ -50,7 +50,7 @@ def _run_locally(function: Callable[..., T], units: Sequence[tuple[Any, ...]]) -
         yield from parallel(joblib.delayed(_local_unit)(function, unit) for unit in units)
     except TerminatedWorkerError:
         raise AnyviewError(
-            "a worker process was killed, perhaps for want of memory; run the same command again to continue, "
+            "a worker process was killed, perhaps for want of memory; run the same command again, "
             "with fewer ANYVIEW_WORKERS if it happens again"
         ) from None
 

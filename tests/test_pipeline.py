@@ -1,0 +1,112 @@
+"""The smoke profile through the real ``dvc repro``, in a clone."""
+
+import json
+import math
+import time
+from typing import Any
+
+import pytest
+
+from anyview.config import load_params
+
+BOUNDS = ("", "_low", "_high")
+
+
+@pytest.fixture(scope="module")
+def metrics(smoke) -> dict[str, Any]:
+    folder = smoke.folder / "metrics"
+    return {path.stem: json.loads(path.read_text()) for path in folder.glob("*.json")}
+
+
+def leaves(tree: Any, path: tuple[str, ...] = ()):
+    if isinstance(tree, dict):
+        for key, branch in tree.items():
+            yield from leaves(branch, (*path, key))
+    else:
+        yield ".".join(path), tree
+
+
+def test_the_second_run_has_nothing_to_do(smoke):
+    before = {path: path.stat().st_mtime_ns for path in (smoke.folder / "metrics").rglob("*")}
+    assert "Data and pipelines are up to date." in smoke.run("dvc", "repro")
+    assert {path: path.stat().st_mtime_ns for path in (smoke.folder / "metrics").rglob("*")} == before
+    assert "up to date" in smoke.run("dvc", "status")
+
+
+def test_every_stage_left_its_outputs(smoke):
+    params = load_params(smoke.folder / "params.yaml")
+    for folder, cells in {
+        "sim": ["diverse", "narrow"],
+        "models": params.translation.cells,
+        "policies": params.imitation.cells,
+    }.items():
+        for cell in cells:
+            assert any((smoke.folder / "data" / folder / cell).iterdir()), cell
+    assert (smoke.folder / "data" / "report" / "index.html").is_file()
+    assert [path for path in smoke.folder.rglob(".*.partial")] == []
+
+
+def test_results_hold_no_trace_of_time_or_place(smoke):
+    """A cache has to hit on another machine."""
+    for path in [*smoke.folder.glob("data/**/*.csv"), *smoke.folder.glob("data/**/*.json")]:
+        text = path.read_text()
+        assert str(smoke.folder) not in text, path
+        assert str(smoke.scratch) not in text, path
+        assert time.strftime("%Y-%m-") not in text, path
+
+
+def test_git_sees_results_and_nothing_else(smoke):
+    """Data belongs to DVC; metrics and the lock belong to Git."""
+    status = smoke.run("git", "status", "--porcelain", "--untracked-files=all").splitlines()
+    changed = {line[3:] for line in status}
+    allowed = ("metrics/", "dvc.lock", "params.yaml")
+    assert [
+        name for name in changed if not name.startswith(allowed) and not name.endswith(".gitignore")
+    ] == []
+
+
+def test_metrics_are_plain_rounded_numbers(metrics):
+    assert metrics.keys() == {"data", "translation", "imitation"}
+    for name, value in leaves(metrics):
+        assert isinstance(value, int | float), name
+        assert not isinstance(value, bool), name
+        assert math.isfinite(value), name
+        assert value == float(f"{value:.4g}") or value == round(value, 4), name
+
+
+def test_metrics_of_data(metrics):
+    for kind, demos in (("diverse", 24), ("narrow", 16)):
+        assert metrics["data"]["sim"][kind]["demos"] == demos
+        assert metrics["data"]["sim"][kind].keys() >= {"demos", "expert_success", "acceptance"}
+    real = metrics["data"]["real"]
+    assert real.keys() >= {"surrogate", "recorded", "refused", "train", "validation", "extreme"}
+    assert real["surrogate"] > 0
+    assert real["recorded"] == 0
+
+
+def test_metrics_of_translation(smoke, metrics):
+    cells = load_params(smoke.folder / "params.yaml").translation.cells
+    assert metrics["translation"].keys() == {
+        name for name, cell in cells.items() if cell.method == "translator"
+    }
+    for name, values in metrics["translation"].items():
+        assert values.keys() >= {"iterations", "best_iteration", "surrogate", "validation"}
+        assert values["iterations"] == 4
+        assert values["surrogate"] == int(cells[name].dataset == "real")
+        for part in ("validation", "extreme") if cells[name].dataset == "real" else ("validation",):
+            for measure in ("loss", "translation", "reconstruction", "alignment", "psnr", "ssim"):
+                assert {measure + bound for bound in BOUNDS} <= values[part].keys()
+        assert ("extreme" in values) == (cells[name].dataset == "real")
+        if "extreme" in values:
+            assert "ratio" in values["extreme"]
+
+
+def test_metrics_of_imitation(smoke, metrics):
+    cells = load_params(smoke.folder / "params.yaml").imitation.cells
+    assert metrics["imitation"].keys() == cells.keys()
+    for name, values in metrics["imitation"].items():
+        assert values["runs"] == 2
+        for measure in ("success_rate", "final_distance_median", "return_policy"):
+            low, mean, high = (values[measure + bound] for bound in ("_low", "", "_high"))
+            assert low <= mean <= high, (name, measure)
+        assert ("return_expert" in values) == (cells[name].reward in ("translated", "true"))

@@ -1,0 +1,260 @@
+"""The house rules of the layout: who may import whom, and that dvc.yaml tells the truth about the stages."""
+
+import ast
+import importlib.metadata
+import re
+import sys
+import tomllib
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+from dvc.repo import Repo
+
+from anyview.config import load_params
+
+ROOT = Path(__file__).parents[1]
+SOURCE = ROOT / "src"
+
+# What a package may import beside itself. Every package may import runtime and config.
+ALLOWED = {
+    "runtime": set(),
+    "sim": set(),
+    "clips": set(),
+    "translation": {"clips"},
+    "imitation": {"clips", "translation", "sim"},
+    "report": {"clips", "translation", "imitation", "sim"},
+}
+
+# Modules that serve a stage without changing what it makes: an edit of theirs must not retrain anything.
+SERVANTS = {
+    "src/anyview/config.py",
+    *(
+        f"src/anyview/runtime/{name}.py"
+        for name in (
+            "checkpoints",
+            "device",
+            "errors",
+            "graphics",
+            "once",
+            "outputs",
+            "parent",
+            "progress",
+            "scratch",
+            "workers",
+        )
+    ),
+}
+
+
+def parse(path: Path) -> list[ast.AST]:
+    """Every node of a module but those that only a type checker sees."""
+
+    def walk(node: ast.AST) -> Iterator[ast.AST]:
+        yield node
+        for child in ast.iter_child_nodes(node):
+            if not (isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING"):
+                yield from walk(child)
+
+    return list(walk(ast.parse(path.read_text(encoding="utf-8"))))
+
+
+def imported_names(path: Path) -> Iterator[str]:
+    """Dotted names of all that a module imports, ``from a import b`` giving ``a.b``."""
+    for node in parse(path):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+@cache
+def our_imports(path: Path) -> frozenset[Path]:
+    """Files of ours that a module imports itself."""
+    return frozenset(found for name in imported_names(path) if (found := _file_of(name)) is not None)
+
+
+def _file_of(name: str) -> Path | None:
+    """The file of the module ``name``, or of the module that holds the attribute ``name``."""
+    if not name.startswith("anyview"):
+        return None
+    for parts in (name.split("."), name.split(".")[:-1]):
+        path = SOURCE.joinpath(*parts)
+        if path.with_suffix(".py").is_file():
+            return path.with_suffix(".py")
+        if (path / "__init__.py").is_file():
+            return path / "__init__.py"
+    raise AssertionError(f"{name}: no such module")
+
+
+def reached_from(path: Path) -> set[str]:
+    """Files of ours that can run when ``path`` does, itself included, relative to the root."""
+    reached, ahead = {path}, [path]
+    while ahead:
+        for found in our_imports(ahead.pop()) - reached:
+            reached.add(found)
+            ahead.append(found)
+    return {str(file.relative_to(ROOT)) for file in reached}
+
+
+TESTS_OF_A_WHOLE = {"test_browser.py"}
+
+MODULES = sorted(SOURCE.rglob("*.py"))
+STAGES = sorted((ROOT / "stages").glob("*.py"))
+
+
+def package(path: Path) -> str:
+    """The package below ``anyview`` that a file belongs to ("" for the top)."""
+    parts = path.relative_to(SOURCE / "anyview").parts
+    return parts[0] if len(parts) > 1 else ""
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(SOURCE)))
+def test_dependencies_point_one_way(path):
+    here = package(path)
+    if not here:
+        return  # the command line and its helpers stand above all packages
+    others = {file for file in our_imports(path) if package(file) != here}
+    top = {file.stem for file in others if not package(file)} - {"__init__"}
+    assert top <= ({"config"} if here != "runtime" else set())
+    assert {package(file) for file in others} - {"", "runtime"} <= ALLOWED[here]
+
+
+def test_no_module_imports_itself_round_a_corner():
+    for path in MODULES:
+        for found in our_imports(path) - {path}:
+            assert str(path.relative_to(ROOT)) not in reached_from(found) or path.name == "__init__.py", (
+                f"{path.relative_to(SOURCE)} and {found.relative_to(SOURCE)} import each other"
+            )
+
+
+def test_every_import_is_declared():
+    """Packages that src or stages import are dependencies in pyproject.toml, and these are imported."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+
+    def names(requirements: list[str]) -> set[str]:
+        return {re.split(r"[^\w.-]", text)[0].lower().replace("_", "-") for text in requirements}
+
+    required = names(project["dependencies"])
+    distributions = importlib.metadata.packages_distributions()
+    used = {name.split(".")[0] for path in [*MODULES, *STAGES] for name in imported_names(path)}
+    used -= {"anyview", *sys.stdlib_module_names}
+    owners = {
+        name: {dist.lower().replace("_", "-") for dist in distributions.get(name, [name])} for name in used
+    }
+    optional = names(project["optional-dependencies"]["cluster"])
+    assert {name for name, found in owners.items() if not found & (required | optional)} == set()
+    assert required - set().union(*owners.values()) == {"dvc"}  # which is run, not imported
+
+
+@cache
+def declared() -> dict[str, tuple[set[str], set[str]]]:
+    """dvc.yaml as DVC reads it: address of a stage -> (dependencies, outputs), relative to the root."""
+    with Repo(str(ROOT)) as repo:
+        return {
+            stage.addressing: (
+                {str(Path(dep.fs_path).relative_to(ROOT)) for dep in stage.deps if not dep.is_param},
+                {str(Path(out.fs_path).relative_to(ROOT)) for out in stage.outs},
+            )
+            for stage in repo.index.stages
+        }
+
+
+def code_of(stage: str) -> dict[str, set[str]]:
+    """Code that the cells of ``stage`` declare."""
+    cells = {name: deps for name, (deps, _) in declared().items() if name.split("@")[0] == stage}
+    assert cells, f"{stage}: not in dvc.yaml"
+    return {name: {dep for dep in deps if dep.endswith(".py")} for name, deps in cells.items()}
+
+
+@pytest.mark.parametrize("stage", [path.stem for path in STAGES])
+def test_a_stage_depends_on_the_code_that_it_runs(stage):
+    """No edit goes unnoticed, and none reruns a stage that does not use it.
+
+    Cells may differ where each runs code of its own (a learner, a reward); together they name all of it.
+    """
+    reached = {
+        file
+        for file in reached_from(ROOT / "stages" / f"{stage}.py")
+        if file not in SERVANTS and not file.endswith("__init__.py")
+    }
+    cells = code_of(stage)
+    assert set().union(*cells.values()) == reached
+    for name, code in cells.items():
+        assert f"stages/{stage}.py" in code, name
+
+
+def test_servants_exist():
+    assert [name for name in SERVANTS if not (ROOT / name).is_file()] == []
+
+
+def test_every_stage_has_a_script_and_every_script_a_stage():
+    assert {name.split("@")[0] for name in declared()} == {path.stem for path in STAGES}
+
+
+def test_cells_are_those_of_params():
+    params = load_params(ROOT / "params.yaml")
+    translators = {name for name, cell in params.translation.cells.items() if cell.method == "translator"}
+    cells: dict[str, set[str]] = {}
+    for address in declared():
+        stage, _, cell = address.partition("@")
+        cells.setdefault(stage, set()).add(cell)
+    assert cells["train"] == set(params.translation.cells)
+    assert cells["translate"] == translators
+    assert cells["imitate"] == set(params.imitation.cells)
+
+
+def test_the_report_reads_every_cell():
+    """Its inputs are written out one by one: none may be forgotten, and none may be left over."""
+    outputs = {out for address, (_, outs) in declared().items() if address != "report" for out in outs}
+    data = {dep for dep in declared()["report"][0] if dep.startswith("data/")}
+    assert outputs - data <= {"data/real/surrogate"}
+    assert data <= outputs
+
+
+def test_outputs_are_one_folder_or_table_a_cell():
+    """A consumer that names a file in an output, or a folder above it, would be told "up to date" wrongly."""
+    outputs = [Path(out) for _, outs in declared().values() for out in outs]
+    assert len(outputs) == len(set(outputs))
+    for address, (deps, _) in declared().items():
+        for dep in deps:
+            if dep.startswith("data/") and dep != "data/real/raw":
+                assert Path(dep) in outputs, f"{address}: {dep}"
+
+
+@pytest.mark.parametrize(
+    "path", sorted((ROOT / "tests").rglob("test_*.py")), ids=lambda path: str(path.relative_to(ROOT))
+)
+def test_tests_mirror_the_source(path):
+    """tests/sim/test_scene.py tests src/anyview/sim/scene.py, a module or a package: easy to find."""
+    relative = path.relative_to(ROOT / "tests")
+    if len(relative.parts) == 1 or relative.name in TESTS_OF_A_WHOLE:
+        return
+    name = relative.stem.removeprefix("test_")
+    folder = SOURCE / "anyview" / relative.parent
+    assert (folder / f"{name}.py").is_file() or (folder / name).is_dir(), (
+        f"no {folder.relative_to(ROOT)}/{name}"
+    )
+
+
+def test_there_are_no_catch_all_modules():
+    assert [path for path in MODULES if path.stem in ("utils", "helpers", "misc", "common")] == []
+
+
+def test_the_locks_hold_hashes_and_no_addresses():
+    for name in ("requirements.lock", "requirements-dev.lock"):
+        text = (ROOT / name).read_text()
+        pins = re.findall(r"^([\w.-]+)==\S+ \\\n((?:    --hash=sha256:[0-9a-f]{64}(?: \\)?\n)+)", text, re.M)
+        assert len(pins) == len(re.findall(r"^[\w.-]+[=<>@ ]", text, re.M)) > 100
+        assert "://" not in text
+        assert not re.search(r"^(torch|nvidia|triton)", text, re.M)
+
+
+def test_the_lock_for_users_is_part_of_the_one_for_developers():
+    pins = [
+        set(re.findall(r"^[\w.-]+==\S+", (ROOT / name).read_text(), re.M))
+        for name in ("requirements.lock", "requirements-dev.lock")
+    ]
+    assert pins[0] <= pins[1]
