@@ -4,6 +4,7 @@ import xml.etree.ElementTree as ElementTree
 
 import pytest
 
+from anyview.config import read_yaml
 from anyview.report.dag import draw, needed_edges, read_stages
 from anyview.runtime.errors import AnyviewError
 
@@ -66,6 +67,15 @@ def test_the_drawing_is_well_formed_and_names_every_stage():
     for box in svg.iter("rect"):
         assert left <= float(box.attrib["x"]) <= width - float(box.attrib["width"])
         assert top <= float(box.attrib["y"]) <= height - float(box.attrib["height"])
+
+
+def test_no_arrow_of_our_own_pipeline_passes_behind_a_box(root):
+    pipeline, params = (read_yaml(root / name) for name in ("dvc.yaml", "params.yaml"))
+    svg = ElementTree.fromstring(draw(read_stages(pipeline, params)))
+    arrows = [path.attrib["d"] for path in svg.iter("path") if path.attrib.get("class") == "edge"]
+    ends = [(float(d[1:].split("C")[0].split()[1]), float(d.split()[-1])) for d in arrows]
+    assert len(arrows) >= 8
+    assert len({bottom - top for top, bottom in ends}) == 1
 
 
 @pytest.mark.parametrize("pipeline", [{}, [], {"stages": {"train": {"foreach": "${no.such}", "do": {}}}}])

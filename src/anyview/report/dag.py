@@ -101,14 +101,12 @@ def _sorted(followers: Edges) -> list[str]:
 def draw(stages: list[Stage]) -> str:
     """The stages as an SVG element, top to bottom; colours come from the page's style sheet."""
     edges = needed_edges(stages)
-    depth = {stage.name: 0 for stage in stages}
-    for name in reversed(_sorted(edges)):
-        for follower in edges[name]:
-            depth[follower] = max(depth[follower], depth[name] + 1)
-    layers = [
-        [stage.name for stage in stages if depth[stage.name] == level]
-        for level in range(max(depth.values()) + 1)
-    ]
+    # A stage stands right above its first follower: then few arrows pass behind another box.
+    above_end: dict[str, int] = {}
+    for name in _sorted(edges):
+        above_end[name] = 1 + max((above_end[follower] for follower in edges[name]), default=-1)
+    levels = range(max(above_end.values()), -1, -1)
+    layers = [[stage.name for stage in stages if above_end[stage.name] == level] for level in levels]
     widest = max(len(layer) for layer in layers)
     width = widest * _BOX_WIDTH + (widest - 1) * _GAP_X + 2 * _MARGIN
     height = len(layers) * _BOX_HEIGHT + (len(layers) - 1) * _GAP_Y + 2 * _MARGIN

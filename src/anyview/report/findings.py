@@ -9,7 +9,7 @@ from scipy import stats
 from anyview.report.cells import label
 from anyview.report.comparisons import Comparison, Effect
 from anyview.report.inputs import Evaluation
-from anyview.report.words import ABSENT, centimetres_spread, listed, number, percent
+from anyview.report.words import ABSENT, centimetres_spread, listed, percent
 
 BLIND = 0.2
 """Rank correlation of return with nearness below which a reward counts as blind to the task."""
@@ -113,7 +113,7 @@ def anatomy_row(cell: str, measured: Anatomy) -> tuple[str, ...]:
     carried, reached = (
         ABSENT if share is None else percent(share) for share in (measured.carried, measured.reached)
     )
-    guidance = ABSENT if measured.guidance is None else number(round(measured.guidance, 2))
+    guidance = ABSENT if measured.guidance is None else f"{measured.guidance:.2f}".replace("-", "−")
     return (label(cell), percent(measured.success), carried, reached, guidance, why(measured))
 
 
