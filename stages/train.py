@@ -4,7 +4,8 @@ from pathlib import Path
 
 from anyview.config import EmbeddingCell, load_params
 from anyview.runtime.errors import AnyviewError, run_stage
-from anyview.translation.training import Recipe, train_translator
+from anyview.translation.trainer import Recipe
+from anyview.translation.training import train_translator
 
 
 def main(arguments: list[str]) -> None:

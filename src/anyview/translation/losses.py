@@ -7,7 +7,7 @@ times the mean (inferred: the thesis does not say). So the scale stays the same 
 from dataclasses import dataclass
 
 import torch
-from torch import Tensor
+from torch import Generator, Tensor
 from torch.nn import functional as F
 
 from anyview.config import LossWeights
@@ -32,6 +32,12 @@ class Losses:
         parts = [getattr(weights, name) * loss for name in NAMES if (loss := getattr(self, name)) is not None]
         return sum(parts[1:], parts[0])
 
+    def parts(self) -> list[Tensor]:
+        """The three losses without gradients, NaN where one was left out."""
+        present = [getattr(self, name) for name in NAMES]
+        like = next(loss for loss in present if loss is not None)
+        return [torch.full_like(like, torch.nan) if loss is None else loss.detach() for loss in present]
+
 
 def frame_loss(output: Tensor, target: Tensor) -> Tensor:
     """50 |output - target|^2, mean over the batch; both (N, 3, H, W) in [-1, 1]."""
@@ -49,20 +55,23 @@ def batch_losses(
     context: Tensor,
     target: Tensor,
     wanted: LossWeights | None = None,
+    noise: Generator | None = None,
 ) -> Losses:
     """Losses of o_t^i, o_0^j and o_t^j, each (N, 3, H, W) in [-1, 1].
 
-    With ``wanted`` only the losses whose weight is above 0 are computed. Both passes through Enc1 are one
-    batch, and both decodings share what the decoder makes of the context's skips.
+    With ``wanted`` only the losses whose weight is above 0 are computed; ``noise`` turns dropout on. Both
+    passes through Enc1 are one batch, and both decodings share what the decoder makes of the skips.
     """
-    z1, z_true = model.encode_expert(torch.cat((expert, target))).chunk(2)
-    z2, skips = model.encode_context(context)
-    z3 = model.translate(z1, z2)
+    z1, z_true = model.encode_expert(torch.cat((expert, target)), noise).chunk(2)
+    z2, skips = model.encode_context(context, noise)
+    z3 = model.translate(z1, z2, noise)
     shares = model.decoder.shares(skips)
+
+    def decoding_loss(z: Tensor) -> Tensor:
+        return frame_loss(model.decoder(z, shares, noise), target)
+
     return Losses(
-        frame_loss(model.decoder(z3, shares), target) if wanted is None or wanted.translation else None,
-        frame_loss(model.decoder(z_true, shares), target)
-        if wanted is None or wanted.reconstruction
-        else None,
+        decoding_loss(z3) if wanted is None or wanted.translation else None,
+        decoding_loss(z_true) if wanted is None or wanted.reconstruction else None,
         alignment_loss(z3, z_true) if wanted is None or wanted.alignment else None,
     )

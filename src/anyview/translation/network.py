@@ -10,7 +10,7 @@ from typing import Literal, cast
 
 import numpy as np
 import torch
-from torch import Tensor, nn
+from torch import Generator, Tensor, nn
 from torch.nn import functional as F
 
 from anyview.runtime.errors import AnyviewError
@@ -88,16 +88,16 @@ class Encoder(nn.Module):
         side = image_size // architecture.stride
         self.hidden = nn.Linear(side * side * channels[-1], architecture.width)
         self.output = nn.Linear(architecture.width, architecture.width)
-        self.dropout = nn.Dropout(architecture.dropout)
+        self._dropout = architecture.dropout
 
-    def forward(self, frames: Tensor) -> tuple[Tensor, list[Tensor]]:
+    def forward(self, frames: Tensor, noise: Generator | None = None) -> tuple[Tensor, list[Tensor]]:
         maps = []
         x = frames
         for convolution in self.convolutions:
             x = _activate(convolution(x))
             maps.append(x)
         flat = x.movedim(1, -1).flatten(1)  # (row, column, channel): no copy in channels_last
-        return self.output(self.dropout(_activate(self.hidden(flat)))), maps
+        return self.output(_drop(_activate(self.hidden(flat)), self._dropout, noise)), maps
 
 
 class Translation(nn.Module):
@@ -107,10 +107,11 @@ class Translation(nn.Module):
         super().__init__()
         self.hidden = nn.Linear(2 * architecture.width, architecture.width)
         self.output = nn.Linear(architecture.width, architecture.width)
-        self.dropout = nn.Dropout(architecture.dropout)
+        self._dropout = architecture.dropout
 
-    def forward(self, z1: Tensor, z2: Tensor) -> Tensor:
-        return self.output(self.dropout(_activate(self.hidden(torch.cat((z1, z2), dim=1)))))
+    def forward(self, z1: Tensor, z2: Tensor, noise: Generator | None = None) -> Tensor:
+        hidden = _activate(self.hidden(torch.cat((z1, z2), dim=1)))
+        return self.output(_drop(hidden, self._dropout, noise))
 
 
 class SkipConvolution(nn.ConvTranspose2d):
@@ -149,7 +150,7 @@ class Decoder(nn.Module):
         skips = [count for count, _ in reversed(architecture.encoder)]
         inputs = [skips[0], *(count for count, _ in architecture.decoder)]
         self.hidden = nn.Linear(architecture.width, self._side**2 * skips[0])
-        self.dropout = nn.Dropout(architecture.dropout)
+        self._dropout = architecture.dropout
         self.convolutions = nn.ModuleList(
             SkipConvolution(below, skip, channels, stride)
             for below, skip, (channels, stride) in zip(inputs, skips, architecture.decoder, strict=False)
@@ -160,8 +161,8 @@ class Decoder(nn.Module):
         layers = cast(Iterable[SkipConvolution], self.convolutions)
         return [layer.share(skip) for layer, skip in zip(layers, reversed(skips), strict=True)]
 
-    def forward(self, z: Tensor, shares: list[Tensor]) -> Tensor:
-        hidden = self.dropout(_activate(self.hidden(z)))
+    def forward(self, z: Tensor, shares: list[Tensor], noise: Generator | None = None) -> Tensor:
+        hidden = _drop(_activate(self.hidden(z)), self._dropout, noise)
         x = hidden.unflatten(1, (self._side, self._side, -1)).movedim(-1, 1)
         *layers, last = zip(self.convolutions, shares, strict=True)
         for convolution, share in layers:
@@ -174,9 +175,19 @@ def _activate(x: Tensor) -> Tensor:
     return F.leaky_relu(x, _LEAK, inplace=True)
 
 
+def _drop(x: Tensor, probability: float, noise: Generator | None) -> Tensor:
+    """Dropout, in training alone: where there is ``noise`` to draw the mask from."""
+    if noise is None or probability == 0:
+        return x
+    keep = 1 - probability
+    return x * torch.empty_like(x).bernoulli_(keep, generator=noise).div_(keep)
+
+
 class ContextTranslator(nn.Module):
     """The whole translator for square frames of ``image_size`` pixels.
 
+    Dropout, where the architecture has any, is on where a method is given the generator ``noise`` to draw its
+    masks from, and off otherwise, whatever mode the module is in.
     Raises ``AnyviewError`` for an unknown architecture or a size that its strides do not divide.
     """
 
@@ -203,21 +214,21 @@ class ContextTranslator(nn.Module):
         """Whether Enc1 and Enc2 are one encoder."""
         return self.context_encoder is self.expert_encoder
 
-    def encode_expert(self, frames: Tensor) -> Tensor:
+    def encode_expert(self, frames: Tensor, noise: Generator | None = None) -> Tensor:
         """Enc1: z1 (N, width) of ``frames`` (N, 3, H, W) in [-1, 1]."""
-        return self.expert_encoder(frames)[0]
+        return self.expert_encoder(frames, noise)[0]
 
-    def encode_context(self, frames: Tensor) -> tuple[Tensor, list[Tensor]]:
+    def encode_context(self, frames: Tensor, noise: Generator | None = None) -> tuple[Tensor, list[Tensor]]:
         """Enc2: z2 (N, width) of first frames (N, 3, H, W), and the four maps that the decoder skips to."""
-        return self.context_encoder(frames)
+        return self.context_encoder(frames, noise)
 
-    def translate(self, z1: Tensor, z2: Tensor) -> Tensor:
+    def translate(self, z1: Tensor, z2: Tensor, noise: Generator | None = None) -> Tensor:
         """T: z3 (N, width) of z1 (N, width) and z2 (N, width)."""
-        return self.translation(z1, z2)
+        return self.translation(z1, z2, noise)
 
     def decode(self, z: Tensor, skips: list[Tensor]) -> Tensor:
         """Dec: frames (N, 3, H, W) of z (N, width) and the skips of K contexts, where K divides N.
 
-        Row n is decoded in context n modulo K: one context serves a whole clip, or a batch two decodings.
+        Row n is decoded in context n modulo K: one context serves a whole clip, for example.
         """
         return self.decoder(z, self.decoder.shares(skips))

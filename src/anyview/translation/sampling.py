@@ -1,6 +1,7 @@
 """Time-paired frames of two clips, to learn from, and the fixed pairs of clips that judge a translator."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -43,13 +44,26 @@ class Dataset:
 
 @dataclass(frozen=True)
 class FramePairs:
-    """Frames o_t^i, o_0^j and o_t^j, each uint8 (N, H, W, 3), and their clips i and j, each (N,)."""
+    """Frame ``times`` of clips ``sources`` (i) and ``targets`` (j), all three (N,)."""
 
-    expert: np.ndarray
-    context: np.ndarray
-    target: np.ndarray
     sources: np.ndarray
     targets: np.ndarray
+    times: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def parts(self, count: int) -> list["FramePairs"]:
+        """The pairs in ``count`` runs of about equal length, fewer where there are fewer pairs."""
+        bounds = np.linspace(0, len(self), min(count, len(self)) + 1).round().astype(int)
+        return [
+            FramePairs(self.sources[a:b], self.targets[a:b], self.times[a:b]) for a, b in pairwise(bounds)
+        ]
+
+    def frames(self, dataset: Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """o_t^i, o_0^j and o_t^j, each uint8 (N, H, W, 3)."""
+        frames = dataset.frames
+        return frames[self.sources, self.times], frames[self.targets, 0], frames[self.targets, self.times]
 
 
 def open_dataset(name: str) -> Dataset:
@@ -69,19 +83,13 @@ def open_dataset(name: str) -> Dataset:
     return dataset
 
 
-def gather(dataset: Dataset, sources: np.ndarray, targets: np.ndarray, times: np.ndarray) -> FramePairs:
-    """Frame ``times`` (N,) of clips ``sources`` (N,) and ``targets`` (N,), and the targets' first frames."""
-    frames = dataset.frames
-    return FramePairs(frames[sources, times], frames[targets, 0], frames[targets, times], sources, targets)
-
-
 def training_pairs(dataset: Dataset, rng: np.random.Generator, count: int) -> FramePairs:
     """``count`` pairs: any two different clips of the training split, at the same random time."""
     clips = dataset.split("train")
     sources = rng.integers(len(clips), size=count)
     targets = (sources + rng.integers(1, len(clips), size=count)) % len(clips)
     times = rng.integers(dataset.length, size=count)
-    return gather(dataset, clips[sources], clips[targets], times)
+    return FramePairs(clips[sources], clips[targets], times)
 
 
 def clip_pairs(dataset: Dataset, split: str) -> list[tuple[int, int]]:
@@ -109,4 +117,4 @@ def validation_pairs(dataset: Dataset, rng: np.random.Generator, count: int) -> 
     """``count`` fixed frame pairs: the validation clips' pairs in turn, each at a random time."""
     pairs = np.array(clip_pairs(dataset, "validation"))
     chosen = pairs[np.arange(count) % len(pairs)]
-    return gather(dataset, chosen[:, 0], chosen[:, 1], rng.integers(dataset.length, size=count))
+    return FramePairs(chosen[:, 0], chosen[:, 1], rng.integers(dataset.length, size=count))

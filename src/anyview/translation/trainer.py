@@ -1,0 +1,179 @@
+"""One translator in training: its update step, its validation, and its state for a checkpoint."""
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from anyview.config import Training, TranslatorCell
+from anyview.runtime.device import torch_device, use_threads
+from anyview.runtime.seeds import stream, torch_seed
+from anyview.translation.augmentation import Augmentation
+from anyview.translation.losses import Losses, batch_losses
+from anyview.translation.network import ContextTranslator, to_input
+from anyview.translation.sampling import Dataset, FramePairs, training_pairs, validation_pairs
+from anyview.translation.weights import restore_state, stored_state
+
+# A batch is worked off in a fixed number of parts side by side, one thread each: the bytes do not depend on
+# the number of cores, and the threads wait for each other once an iteration, not once an operation.
+_PARTS = 2
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Everything that decides the weights, but for the data."""
+
+    name: str
+    cell: TranslatorCell
+    training: Training
+    seed: int
+
+
+class Trainer:
+    """Model, optimiser and best weights so far. Every random number belongs to an iteration by its index."""
+
+    def __init__(self, recipe: Recipe, dataset: Dataset):
+        self._recipe, self._dataset = recipe, dataset
+        self._device = torch_device()
+        self._parts = _PARTS if self._device.type == "cpu" else 1
+        self._pool = ThreadPoolExecutor(self._parts)
+        use_threads(1)
+        with torch.random.fork_rng():
+            torch.manual_seed(torch_seed(recipe.seed, "translator/weights"))
+            self.model = ContextTranslator(recipe.cell.architecture, dataset.image_size)
+        self.model.to(self._device).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        self._parameters = list(self.model.parameters())
+        self._optimizer = _optimizer(recipe, self._parameters)
+        self._augmentation = Augmentation(dataset) if recipe.cell.augment else None
+        rng = stream(recipe.seed, "translator/validation")
+        self._validation = validation_pairs(dataset, rng, recipe.training.validation_pairs)
+        self.best: dict[str, Tensor] = {}
+        self.best_iteration = 0
+        self.best_loss = math.inf
+
+    def step(self, iteration: int) -> Tensor:
+        """One update; returns the total loss, L_tr, L_rec and L_align (NaN where left out), shape (4,)."""
+        training = self._recipe.training
+        rng = stream(self._recipe.seed, "translator/pairs", iteration)
+        pairs = training_pairs(self._dataset, rng, training.batch_size)
+        parts = pairs.parts(self._parts)
+        work = [(part, iteration, index) for index, part in enumerate(parts)]
+        found = list(self._pool.map(lambda unit: self._gradients(*unit), work))
+        shares = [len(part) / len(pairs) for part in parts]
+        rate = learning_rate(training, iteration, self._recipe.cell.iterations)
+        for group in self._optimizer.param_groups:
+            group["lr"] = rate
+        for index, parameter in enumerate(self._parameters):
+            parameter.grad = _weighted_sum(parameter, [gradients[index] for _, gradients in found], shares)
+        self._optimizer.step()
+        return torch.stack([losses * share for (losses, _), share in zip(found, shares, strict=True)]).sum(0)
+
+    def _gradients(
+        self, pairs: FramePairs, iteration: int, part: int
+    ) -> tuple[Tensor, tuple[Tensor | None, ...]]:
+        cell, seed = self._recipe.cell, self._recipe.seed
+        expert, context, target = self._frames(pairs)
+        if self._augmentation is not None:
+            rng = stream(seed, "translator/augmentation", iteration, part)
+            (expert,) = self._augmentation(expert[None], pairs.sources, rng)
+            context, target = self._augmentation(torch.stack((context, target)), pairs.targets, rng)
+        noise = torch.Generator(self._device).manual_seed(
+            torch_seed(seed, "translator/dropout", iteration, part)
+        )
+        with self._autocast():
+            losses = batch_losses(self.model, expert, context, target, cell.weights, noise)
+        total = losses.total(cell.weights)
+        gradients = torch.autograd.grad(total, self._parameters, allow_unused=True)
+        return torch.stack((total.detach(), *losses.parts())), gradients
+
+    @torch.no_grad()
+    def validate(self, iteration: int) -> Tensor:
+        """The same losses on the fixed validation pairs; keeps the weights if they are the best so far."""
+        count = len(self._validation)
+        parts = self._validation.parts(-(-count // self._recipe.training.batch_size))
+        sums = torch.stack(list(self._pool.map(self._validation_sums, parts))).sum(0)
+        means = sums.double().cpu() / count
+        total = Losses(*means).total(self._recipe.cell.weights)
+        if total < self.best_loss:
+            self.best_loss, self.best_iteration = float(total), iteration
+            self.best = {name: value.clone() for name, value in stored_state(self.model).items()}
+        return torch.stack((total, *means))
+
+    @torch.no_grad()  # the mode is each thread's own
+    def _validation_sums(self, pairs: FramePairs) -> Tensor:
+        with self._autocast():
+            losses = batch_losses(self.model, *self._frames(pairs))
+        return torch.stack(losses.parts()) * len(pairs)
+
+    def best_model(self) -> ContextTranslator:
+        """A translator with the best weights."""
+        model = ContextTranslator(self._recipe.cell.architecture, self._dataset.image_size)
+        restore_state(model, self.best)
+        return model
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Model, optimiser and best weights, for a checkpoint."""
+        arrays = {f"model/{name}": value.numpy() for name, value in stored_state(self.model).items()}
+        arrays |= {f"best/{name}": value.numpy() for name, value in self.best.items()}
+        for index, state in self._optimizer.state_dict()["state"].items():
+            arrays |= {f"optimizer/{index}/{key}": value.cpu().numpy() for key, value in state.items()}
+        return arrays
+
+    def restore(self, arrays: dict[str, np.ndarray], best_iteration: int, best_loss: float) -> None:
+        """Continue from ``arrays()`` bit for bit."""
+        groups: dict[str, dict[str, Tensor]] = {"model": {}, "best": {}, "optimizer": {}}
+        for name, array in arrays.items():
+            kind, rest = name.split("/", 1)
+            groups[kind][rest] = torch.from_numpy(array)
+        restore_state(self.model, groups["model"])
+        self.best, self.best_iteration, self.best_loss = groups["best"], best_iteration, best_loss
+        state: dict[int, dict[str, Tensor]] = {}
+        for name, value in groups["optimizer"].items():
+            index, key = name.split("/")
+            parameter = self._parameters[int(index)]
+            moment = value.shape == parameter.shape
+            state.setdefault(int(index), {})[key] = _laid_out_as(parameter, value) if moment else value
+        self._optimizer.load_state_dict(self._optimizer.state_dict() | {"state": state})
+
+    def _frames(self, pairs: FramePairs) -> tuple[Tensor, Tensor, Tensor]:
+        expert, context, target = (torch.from_numpy(f).to(self._device) for f in pairs.frames(self._dataset))
+        return to_input(expert), to_input(context), to_input(target)
+
+    def _autocast(self) -> torch.autocast:
+        reduced = self._recipe.training.precision == "bfloat16"
+        return torch.autocast(self._device.type, torch.bfloat16, enabled=reduced)
+
+
+def learning_rate(training: Training, iteration: int, iterations: int) -> float:
+    """The rate of an iteration: constant, or half a cosine from ``learning_rate`` down to 0."""
+    if training.schedule == "constant":
+        return training.learning_rate
+    return training.learning_rate * (1 + math.cos(math.pi * iteration / iterations)) / 2
+
+
+def _optimizer(recipe: Recipe, parameters: list[torch.nn.Parameter]) -> torch.optim.Optimizer:
+    rate = recipe.training.learning_rate
+    if recipe.cell.optimizer == "adam":
+        return torch.optim.Adam(parameters, lr=rate, fused=True)
+    return torch.optim.Adadelta(parameters, lr=rate, foreach=True)
+
+
+def _laid_out_as(parameter: Tensor, value: Tensor) -> Tensor:
+    """A copy with the strides of ``parameter``, which the fused optimiser takes for granted."""
+    return torch.empty_like(parameter).copy_(value)
+
+
+def _weighted_sum(
+    parameter: Tensor, gradients: Sequence[Tensor | None], shares: list[float]
+) -> Tensor | None:
+    """The gradient of a batch from those of its parts; None where the loss does not reach the parameter."""
+    total: Tensor | None = None
+    for gradient, share in zip(gradients, shares, strict=True):
+        if gradient is not None:
+            part = _laid_out_as(parameter, gradient).mul_(share)
+            total = part if total is None else total.add_(part)
+    return total
