@@ -152,7 +152,9 @@ class Translation(Block):
 class Reward(Block):
     """The translated demonstration's reward (equations 20 to 22)."""
 
-    phi: NonNegative = Field(description="weight of the image reward L_i beside the feature reward L_f")
+    phi: NonNegative = Field(
+        description="weight of L_i beside L_f, each in units of what standing still costs"
+    )
     time_power: NonNegative = Field(description="reward at step t is weighted by (t/49) to this power")
     demonstrations: Count = Field(description="demonstrations whose translations are averaged")
 
@@ -165,14 +167,16 @@ class DDPG(Block):
     critic_learning_rate: Positive
     discount: Discount
     batch_size: Count
-    updates_per_step: Positive
+    updates_per_step: Positive = Field(description="updates for each step that a run acts in its context")
     target_rate: Annotated[float, Field(gt=0, le=1)] = Field(description="Polyak rate of the target networks")
     replay: Count = Field(description="transitions kept per run")
+    recent_episodes: Count = Field(description="half of each batch comes from this many newest episodes")
     warmup_episodes: int = Field(ge=0, description="episodes of noise alone before updates start")
-    n_step: Count = Field(description="rewards summed before bootstrapping")
-    noise: NonNegative = Field(description="Ornstein-Uhlenbeck scale at the start, in units of the action range")
-    noise_end: NonNegative = Field(description="the same at the end")
-    noise_theta: Fraction = Field(description="Ornstein-Uhlenbeck mean reversion per step")
+    n_step: Annotated[int, Field(ge=1, le=49)] = Field(description="rewards summed before bootstrapping")
+    time_bumps: int = Field(ge=0, description="Gaussian bumps over the episode that show the networks the time")
+    noise: Positive = Field(description="Ornstein-Uhlenbeck deviation at first, in units of the action range")
+    noise_end: Positive = Field(description="the same at the end; it falls geometrically")
+    noise_theta: Fraction = Field(description="Ornstein-Uhlenbeck mean reversion per step; 1 is white noise")
 
 
 class TRPO(Block):

@@ -1,0 +1,101 @@
+"""Stage `imitate`: train and evaluate the policies of one cell, into data/policies/<cell>.
+
+Usage: python stages/imitate.py CELL
+"""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from anyview import imitation, sim
+from anyview.clips.splits import read_split
+from anyview.clips.store import open_frames
+from anyview.clips.video import write_video
+from anyview.config import Params, load_params
+from anyview.imitation.evaluation import evaluate_group, groups_of
+from anyview.imitation.policies import save_policies
+from anyview.runtime.errors import AnyviewError, run_stage
+from anyview.runtime.outputs import whole_folder, write_atomically
+from anyview.runtime.scratch import content_key, scratch_folder
+from anyview.runtime.seeds import stream
+from anyview.runtime.workers import run_units
+from anyview.sim.contexts import sample_contexts
+
+DEMONSTRATIONS = Path("data/sim/diverse")
+SPLIT = Path("data/splits/sim-diverse.csv")
+RATE = 10.0  # frames a second
+
+
+def main(arguments: list[str]) -> None:
+    """Evaluate the cell named on the command line; a killed stage continues from its checkpoints."""
+    params = load_params()
+    cells = params.imitation.cells
+    if len(arguments) != 1 or arguments[0] not in cells:
+        raise AnyviewError(f"usage: python stages/imitate.py CELL, where CELL is one of {', '.join(cells)}")
+    name = arguments[0]
+    contexts, _ = sample_contexts(stream(params.base.seed, "evaluation"), params.imitation.runs)
+    demonstrations = _demonstrations(params)
+    key = _key(params, name)
+    groups = groups_of(len(contexts))
+    scratch = [scratch_folder("checkpoints", f"{key}-{index}") for index in range(len(groups))]
+    units = [
+        (name, params, group, [contexts[run] for run in group], demonstrations, folder)
+        for group, folder in zip(groups, scratch, strict=True)
+    ]
+    results = list(run_units(evaluate_group, units))
+    runs = pd.concat([result.runs for result in results], ignore_index=True)
+    curve = pd.concat([result.curve for result in results], ignore_index=True)
+    with whole_folder(Path("data/policies") / name) as output:
+        write_atomically(output / "runs.csv", runs.to_csv(index=False))
+        write_atomically(output / "curve.csv", curve.sort_values(["iteration", "run"]).to_csv(index=False))
+        weights = {
+            each: np.concatenate([result.policies[each] for result in results])
+            for each in results[0].policies
+        }
+        save_policies(
+            output, weights, contexts, cells[name].learner, params.sim.control, params.sim.image_size
+        )
+        (output / "rollouts").mkdir()
+        for run, rollout in enumerate(np.concatenate([result.rollouts for result in results])):
+            write_video(output / "rollouts" / f"run-{run:02d}.avi", rollout, RATE)
+    for folder in scratch:
+        shutil.rmtree(folder)
+    distance = 100 * runs["final_distance"].median()
+    print(f"{name}: {runs['success'].sum()} of {len(runs)} succeed; median distance {distance:.1f} cm")
+
+
+def _demonstrations(params: Params) -> np.ndarray:
+    """The same clips of the validation split for every cell and run: (m, 50, H, W, 3) uint8."""
+    store = open_frames(DEMONSTRATIONS)
+    split = read_split(SPLIT)
+    held_out = set(split["clip"][split["split"] == "validation"])
+    rows = np.flatnonzero(store.manifest["clip"].isin(held_out))
+    wanted = params.imitation.reward.demonstrations
+    if len(rows) < wanted:
+        raise AnyviewError(
+            f"params.yaml: imitation.reward.demonstrations: {wanted}, but {SPLIT} holds out {len(rows)} clips"
+        )
+    size = params.sim.image_size
+    if store.frames.shape[2] != size:
+        raise AnyviewError(
+            f"{DEMONSTRATIONS}: frames of {store.frames.shape[2]} pixels, but sim.image_size is {size}"
+        )
+    chosen = stream(params.base.seed, "imitated").choice(rows, wanted, replace=False)
+    return np.stack([store.frames[row] for row in sorted(chosen)])
+
+
+def _key(params: Params, name: str) -> str:
+    """Changes with everything that the checkpoints of a cell depend on."""
+    values = params.imitation.model_dump(exclude={"cells"}) | params.imitation.cells[name].model_dump()
+    packages = (Path(sim.__file__).parent, Path(imitation.__file__).parent)
+    files = [path for package in packages for path in package.glob("*.py")]
+    files += [DEMONSTRATIONS / "files.csv", SPLIT]
+    source = Path(params.imitation.cells[name].source)
+    files += sorted(source.iterdir()) if source.is_dir() else []
+    return content_key([name, params.base.seed, params.sim.model_dump(), values], files)
+
+
+if __name__ == "__main__":
+    run_stage(main)
