@@ -66,6 +66,15 @@ class FramePairs:
         return frames[self.sources, self.times], frames[self.targets, 0], frames[self.targets, self.times]
 
 
+def check_dataset(cell: str, dataset: str, declared: list[str]) -> None:
+    """Refuse to go on where dvc.yaml says that ``cell`` depends on another dataset than params.yaml does."""
+    if declared and declared != [dataset]:
+        raise AnyviewError(
+            f"params.yaml: translation.cells.{cell}.dataset is {dataset}, but dvc.yaml makes the cell depend "
+            f"on {declared[0]}; change both"
+        )
+
+
 def open_dataset(name: str) -> Dataset:
     """Open one of the pipeline's datasets; clips that no split names are left with an empty split."""
     folder, table = DATASETS[name]

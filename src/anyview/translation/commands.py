@@ -1,0 +1,37 @@
+"""The command `anyview translate`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def translate(
+    clip: Annotated[Path, typer.Argument(help="The expert's clip: any video.")],
+    context: Annotated[
+        Path,
+        typer.Option("--context", help="The other view: a picture, or a video whose first frame is taken."),
+    ],
+    model: Annotated[Path, typer.Option("--model", help="A trained cell, or the folder of a model.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The AVI file to write (lossless FFV1).")],
+) -> None:
+    """Translate a clip to another viewpoint.
+
+    Clip and context are cut to their middle square and shrunk to the model's size. Every frame is translated
+    by itself, so that the result has the clip's length and rate.
+    """
+    from anyview.clips.video import write_video
+    from anyview.runtime.device import torch_device
+    from anyview.runtime.errors import AnyviewError
+    from anyview.translation.evaluation import translate_clip
+    from anyview.translation.footage import read_clip, read_view
+    from anyview.translation.weights import load_translator
+
+    if output.suffix != ".avi":
+        raise AnyviewError(f"{output}: the output must end in .avi")
+    translator = load_translator(model if model.is_dir() else Path("data/models") / model)
+    frames, rate = read_clip(clip, translator.image_size)
+    view = read_view(context, translator.image_size)
+    translated = translate_clip(translator.to(torch_device()), frames, view)
+    write_video(output, translated, rate)
+    print(f"{output}: {len(translated)} frames of {translator.image_size}x{translator.image_size}")
