@@ -36,7 +36,7 @@ def main(arguments: list[str]) -> None:
         raise AnyviewError(f"usage: python stages/imitate.py CELL, where CELL is one of {', '.join(cells)}")
     name = arguments[0]
     contexts, _ = sample_contexts(stream(params.base.seed, "evaluation"), params.imitation.runs)
-    demonstrations = _demonstrations(params)
+    chosen, demonstrations = _demonstrations(params)
     key = _key(params, name)
     groups = groups_of(len(contexts))
     scratch = [scratch_folder("checkpoints", f"{key}-{index}") for index in range(len(groups))]
@@ -48,6 +48,7 @@ def main(arguments: list[str]) -> None:
     runs = pd.concat([result.runs for result in results], ignore_index=True)
     curve = pd.concat([result.curve for result in results], ignore_index=True)
     with whole_folder(Path("data/policies") / name) as output:
+        write_atomically(output / "demonstrations.csv", pd.DataFrame({"clip": chosen}).to_csv(index=False))
         write_atomically(output / "runs.csv", runs.to_csv(index=False))
         write_atomically(output / "curve.csv", curve.sort_values(["iteration", "run"]).to_csv(index=False))
         weights = {
@@ -66,8 +67,8 @@ def main(arguments: list[str]) -> None:
     print(f"{name}: {runs['success'].sum()} of {len(runs)} succeed; median distance {distance:.1f} cm")
 
 
-def _demonstrations(params: Params) -> np.ndarray:
-    """The same clips of the validation split for every cell and run: (m, 50, H, W, 3) uint8."""
+def _demonstrations(params: Params) -> tuple[list[str], np.ndarray]:
+    """The same clips of the validation split for every cell and run: ids (m), frames (m, 50, H, W, 3) uint8."""
     store = open_frames(DEMONSTRATIONS)
     split = read_split(SPLIT)
     held_out = set(split["clip"][split["split"] == "validation"])
@@ -82,8 +83,8 @@ def _demonstrations(params: Params) -> np.ndarray:
         raise AnyviewError(
             f"{DEMONSTRATIONS}: frames of {store.frames.shape[2]} pixels, but sim.image_size is {size}"
         )
-    chosen = stream(params.base.seed, "imitated").choice(rows, wanted, replace=False)
-    return np.stack([store.frames[row] for row in sorted(chosen)])
+    chosen = sorted(stream(params.base.seed, "imitated").choice(rows, wanted, replace=False))
+    return list(store.manifest["clip"].iloc[chosen]), np.stack([store.frames[row] for row in chosen])
 
 
 def _key(params: Params, name: str) -> str:
