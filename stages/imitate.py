@@ -68,7 +68,7 @@ def main(arguments: list[str]) -> None:
 
 
 def _demonstrations(params: Params) -> tuple[list[str], np.ndarray]:
-    """The same clips of the validation split for every cell and run: ids (m), frames (m, 50, H, W, 3) uint8."""
+    """The same clips of the validation split for every cell and run: ids, uint8 frames (m, 50, H, W, 3)."""
     store = open_frames(DEMONSTRATIONS)
     split = read_split(SPLIT)
     held_out = set(split["clip"][split["split"] == "validation"])
