@@ -10,7 +10,7 @@ from anyview.runtime.errors import BAD_INPUT, AnyviewError
 BACKENDS = ("egl", "osmesa")
 MISSING = (
     "no headless OpenGL works here (tried EGL and OSMesa); "
-    "on Debian or Ubuntu: apt-get install libegl1 libgl1-mesa-dri libosmesa6"
+    "on Debian or Ubuntu: apt-get install libegl1 libopengl0 libgl1-mesa-dri libosmesa6"
 )
 
 _PROBE = """
