@@ -60,10 +60,11 @@ audit: .setup-stamp-dev ## known vulnerabilities and licences of what is install
 	$(PYTHON) -m venv .venv-audit
 	.venv-audit/bin/python -m pip install --quiet pip-audit pip-licenses
 	.venv-audit/bin/pip-licenses --python .venv/bin/python --order license
-	.venv-audit/bin/pip-audit --no-deps --disable-pip --requirement requirements-dev.lock
+	.venv-audit/bin/pip-audit --strict --no-deps --disable-pip --requirement requirements-dev.lock
+	echo "$(TORCH)" | .venv-audit/bin/pip-audit --strict --no-deps --disable-pip --requirement /dev/stdin
 
 clean: ## remove environments and caches; data, results and DVC's cache stay
-	rm -rf .venv .venv-audit .setup-stamp* .mypy_cache .pytest_cache .ruff_cache .hypothesis src/*.egg-info
+	rm -rf .venv .venv-audit .setup-stamp* .mypy_cache .pytest_cache .ruff_cache .hypothesis src/*.egg-info benchmarks/out
 	find . -name __pycache__ -not -path './.dvc/*' -prune -exec rm -rf {} +
 
 # PyTorch first, by exact version; the rest by hash. PyTorch brings setuptools, so that nothing else is
