@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from anyview.clips.store import write_shard
 from anyview.clips.video import write_video
 from anyview.config import Params, load_params
 
@@ -38,7 +39,13 @@ class Data:
     def demonstrations(self, kind: str, count: int = 40) -> None:
         folder = self._folder("sim", kind)
         clips = [f"{kind}-{index:04d}" for index in range(count)]
-        self._csv(folder / "manifest.csv", clip=clips, success=[index != 3 for index in range(count)])
+        shards = np.arange(count) // 20
+        rows = {"clip": clips, "shard": shards, "position": np.arange(count) % 20}
+        self._csv(folder / "manifest.csv", **rows, success=[index != 3 for index in range(count)])
+        stored = [
+            write_shard(folder, shard, np.stack([clip(50, n, 2) for n in range(20)])) for shard in set(shards)
+        ]
+        self._csv(folder / "files.csv", file=[each.file for each in stored], frames=[50] * len(stored))
         self._json(folder / "summary.json", demos=count, expert_success=0.975, acceptance=0.4)
 
     def real_clips(self) -> None:
@@ -60,7 +67,8 @@ class Data:
         places = ["validation"] * 6 + ["extreme"] * (4 if extreme else 0)
         clips = [f"clip-{index:03d}" for index in range(len(places))]
         hard = np.where(np.array(places) == "extreme", 2.7, 1.0) * scale
-        rows = pd.DataFrame({"clip": clips, "split": places})
+        pairs = [f"pair-{index // 2}" for index in range(len(places))]
+        rows = pd.DataFrame({"clip": clips, "pair": pairs, "split": places})
         for name, size in (
             ("loss", 4_000),
             ("translation", 2_000),
@@ -68,6 +76,7 @@ class Data:
             ("alignment", 100),
         ):
             rows[name] = hard * size * self.rng.uniform(0.8, 1.2, len(places))
+        rows["last_frame"] = rows["translation"]
         rows["psnr"], rows["ssim"] = (
             self.rng.uniform(20, 25, len(places)),
             self.rng.uniform(0.7, 0.9, len(places)),
@@ -76,7 +85,7 @@ class Data:
         frames = 80 if cell.startswith("real") else 50
         self._csv(folder / "feature_weights.csv", frame=range(frames), weight=[1 / frames] * frames)
         (folder / "clips").mkdir()
-        for index, name in enumerate(clips):
+        for index, name in enumerate(clips[:3] + clips[6:9]):
             pair = np.concatenate([clip(frames, 0, 0), clip(frames, 1, index % 3)], axis=2)
             write_video(folder / "clips" / f"{name}.avi", pair, 10.0)
 
@@ -103,8 +112,9 @@ class Data:
         if blind:
             curve["discriminator_accuracy"] = 0.97
         curve.to_csv(folder / "curve.csv", index=False)
+        self._csv(folder / "demonstrations.csv", clip=["diverse-0003", "diverse-0007"])
         (folder / "rollouts").mkdir()
-        for run in range(3):
+        for run in range(RUNS):
             pair = np.concatenate([clip(50, run, 0), clip(50, run, 1)], axis=2)
             write_video(folder / "rollouts" / f"run-{run:02d}.avi", pair, 10.0)
 

@@ -23,7 +23,7 @@ def evaluation(distance, curve=None, **returns) -> Evaluation:
     )
     if curve is None:
         curve = pd.DataFrame({"iteration": [0], "run": [0], "final_distance": [0.5], "return": [-1.0]})
-    return Evaluation(Path(), runs, curve)
+    return Evaluation(Path(), runs, curve, ())
 
 
 def test_a_small_shift_shows_in_pairs_though_contexts_differ_widely():
@@ -48,7 +48,7 @@ def test_an_order_is_claimed_exactly_where_the_interval_excludes_zero(seed):
 
 def test_only_shared_runs_are_compared():
     other = evaluation(CONTEXT + 0.1)
-    part = Evaluation(Path(), other.runs[other.runs["run"] > 4], other.curve)
+    part = Evaluation(Path(), other.runs[other.runs["run"] > 4], other.curve, ())
     (entry,) = compare_with_ours({"ours": evaluation(CONTEXT), "liu": part}, seed=1)
     assert entry.runs == 10
 

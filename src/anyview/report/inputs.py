@@ -20,10 +20,24 @@ RETURNS = ("return_policy", "return_still", "return_arm_only", "return_expert")
 
 @dataclass(frozen=True)
 class Demonstrations:
-    """A simulated set: the expert's ``success`` (n,), and the share of proposed contexts accepted."""
+    """A simulated set: a row per demonstration, and the share of proposed contexts that were accepted."""
 
-    success: np.ndarray
+    folder: Path
+    manifest: pd.DataFrame
     acceptance: float
+
+    @property
+    def success(self) -> np.ndarray:
+        """Whether the expert succeeded (n,)."""
+        return self.manifest["success"].to_numpy(bool)
+
+    def frames(self, clip: str) -> np.ndarray:
+        """A demonstration's frames, uint8 RGB (T, H, W, 3): its shard alone is read."""
+        row = self.manifest.set_index("clip").loc[clip]
+        stored = read_table(self.folder / "files.csv", ["file", "frames"]).iloc[int(row["shard"])]
+        shard = read_video(self.folder / stored["file"])
+        start = int(row["position"]) * int(stored["frames"])
+        return shard[start : start + int(stored["frames"])]
 
 
 @dataclass(frozen=True)
@@ -72,11 +86,12 @@ class Translation:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """A method's evaluation: a row per run; a row per iteration and run."""
+    """A method's evaluation: a row per run; a row per iteration and run; the clips that rewards average."""
 
     folder: Path
     runs: pd.DataFrame
     curve: pd.DataFrame
+    demonstrations: tuple[str, ...]
 
     @property
     def rollouts(self) -> list[int]:
@@ -151,9 +166,8 @@ def _present(folder: Path, names: Iterable[str], suffix: str = "") -> dict[str, 
 
 
 def _demonstrations(folder: Path) -> Demonstrations:
-    manifest = read_table(folder / "manifest.csv", ["clip", "success"])
-    summary = _json(folder / "summary.json", "acceptance")
-    return Demonstrations(manifest["success"].to_numpy(bool), float(summary["acceptance"]))
+    manifest = read_table(folder / "manifest.csv", ["clip", "shard", "position", "success"], unique="clip")
+    return Demonstrations(folder, manifest, float(_json(folder / "summary.json", "acceptance")["acceptance"]))
 
 
 def _clips(folder: Path) -> Clips:
@@ -175,7 +189,8 @@ def _translation(folder: Path) -> Translation:
 def _evaluation(folder: Path) -> Evaluation:
     runs = _numbers(folder / "runs.csv", ["run", "success", "final_distance"])
     curve = _numbers(folder / "curve.csv", ["iteration", "run", "final_distance", "return"])
-    return Evaluation(folder, runs.sort_values("run", ignore_index=True), curve)
+    demonstrations = read_table(folder / "demonstrations.csv", ["clip"])["clip"]
+    return Evaluation(folder, runs.sort_values("run", ignore_index=True), curve, tuple(demonstrations))
 
 
 def _numbers(path: Path, columns: list[str]) -> pd.DataFrame:

@@ -23,8 +23,10 @@ ACTIONS = 49
 
 
 IDEA = (
-    "One run of ours. The agent never sees the expert’s film itself: it is rewarded for how well its own "
-    "camera’s frames match the translated ones."
+    "One run of ours, of median final distance. Top: an expert’s demonstration, filmed from a viewpoint "
+    "of its own. Middle: how the translator expects such demonstrations to look through the agent’s "
+    "camera, the mean of several: this is what the agent is rewarded for matching. Bottom: the trained "
+    "agent."
 )
 
 
@@ -38,12 +40,14 @@ class Headline:
 
 
 def idea_strip(study: Study) -> Strip | None:
-    """Expert, translated and agent frames of one run of `ours`: the first that was filmed."""
-    if OURS not in study.evaluations or not study.evaluations[OURS].rollouts:
+    """Expert, translated and agent frames of a run of `ours`: the one of median final distance."""
+    if OURS not in study.evaluations or "diverse" not in study.demonstrations:
         return None
     evaluation = study.evaluations[OURS]
-    agent, translated = np.split(evaluation.rollout(evaluation.rollouts[0]), 2, axis=2)
-    return make_strip([("translated", translated), ("agent", agent)])
+    runs = evaluation.runs.sort_values("final_distance", kind="stable")
+    agent, translated = np.split(evaluation.rollout(int(runs["run"].iloc[len(runs) // 2])), 2, axis=2)
+    expert = study.demonstrations["diverse"].frames(evaluation.demonstrations[0])
+    return make_strip([("expert", expert), ("translated", translated), ("agent", agent)])
 
 
 def headlines(translation: Tree, imitation: Tree) -> Iterator[Headline]:

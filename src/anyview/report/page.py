@@ -1,12 +1,12 @@
 """The report page: one HTML file that opens offline, with every picture, style and script inside."""
 
+import html
 import io
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup, escape
 from ruamel.yaml import YAML
 
 from anyview.report import exhibits_imitation, exhibits_translation, overview
@@ -46,7 +46,7 @@ def render(
         loader=FileSystemLoader(_FOLDER), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
     environment.filters["svg_uri"] = svg_uri
-    environment.filters["sub"] = lambda text: Markup(subscripts(str(escape(text)), "L<sub>{}</sub>"))
+    environment.filters["sub"] = lambda text: subscripts(html.escape(text), "L<sub>{}</sub>")
     idea = overview.idea_strip(study)
     hashes = tuple((path.as_posix(), dvc_hash(path)) for path in inputs)
     return environment.get_template("page.html").render(
@@ -57,7 +57,7 @@ def render(
         headlines=list(overview.headlines(translation, imitation)),
         surrogate=study.surrogate and any(study.is_real(cell) for cell in study.translations),
         sections=chapters,
-        dag=Markup(draw(read_stages(pipeline, params))),
+        dag=draw(read_stages(pipeline, params)),
         params_key=content_key(params)[:12],
         inputs_key=content_key(hashes)[:12],
         inputs=Table(("Input", "DVC hash"), hashes),
@@ -79,8 +79,8 @@ def _figures(chapters: list[Section]) -> Iterator[tuple[str, str]]:
                 yield exhibit.key, exhibit.figure
 
 
-def _asset(name: str) -> Markup:
-    return Markup((_FOLDER / name).read_text(encoding="utf-8"))
+def _asset(name: str) -> str:
+    return (_FOLDER / name).read_text(encoding="utf-8")
 
 
 def _yaml(values: Any) -> str:
