@@ -10,10 +10,9 @@ import numpy as np
 import pandas as pd
 
 from anyview import imitation, sim
-from anyview.clips.splits import read_split
-from anyview.clips.store import open_frames
 from anyview.clips.video import write_video
 from anyview.config import Params, load_params
+from anyview.imitation.demonstrations import DEMONSTRATIONS, SPLIT, imitated_demonstrations
 from anyview.imitation.evaluation import evaluate_group, groups_of
 from anyview.imitation.policies import save_policies
 from anyview.runtime.errors import AnyviewError, run_stage
@@ -23,8 +22,6 @@ from anyview.runtime.seeds import stream
 from anyview.runtime.workers import run_units
 from anyview.sim.contexts import sample_contexts
 
-DEMONSTRATIONS = Path("data/sim/diverse")
-SPLIT = Path("data/splits/sim-diverse.csv")
 RATE = 10.0  # frames a second
 
 
@@ -36,7 +33,7 @@ def main(arguments: list[str]) -> None:
         raise AnyviewError(f"usage: python stages/imitate.py CELL, where CELL is one of {', '.join(cells)}")
     name = arguments[0]
     contexts, _ = sample_contexts(stream(params.base.seed, "evaluation"), params.imitation.runs)
-    chosen, demonstrations = _demonstrations(params)
+    chosen, demonstrations = imitated_demonstrations(params)
     key = _key(params, name)
     groups = groups_of(len(contexts))
     scratch = [scratch_folder("checkpoints", f"{key}-{index}") for index in range(len(groups))]
@@ -65,26 +62,6 @@ def main(arguments: list[str]) -> None:
         shutil.rmtree(folder)
     distance = 100 * runs["final_distance"].median()
     print(f"{name}: {runs['success'].sum()} of {len(runs)} succeed; median distance {distance:.1f} cm")
-
-
-def _demonstrations(params: Params) -> tuple[list[str], np.ndarray]:
-    """The same clips of the validation split for every cell and run: ids, uint8 frames (m, 50, H, W, 3)."""
-    store = open_frames(DEMONSTRATIONS)
-    split = read_split(SPLIT)
-    held_out = set(split["clip"][split["split"] == "validation"])
-    rows = np.flatnonzero(store.manifest["clip"].isin(held_out))
-    wanted = params.imitation.reward.demonstrations
-    if len(rows) < wanted:
-        raise AnyviewError(
-            f"params.yaml: imitation.reward.demonstrations: {wanted}, but {SPLIT} holds out {len(rows)} clips"
-        )
-    size = params.sim.image_size
-    if store.frames.shape[2] != size:
-        raise AnyviewError(
-            f"{DEMONSTRATIONS}: frames of {store.frames.shape[2]} pixels, but sim.image_size is {size}"
-        )
-    chosen = sorted(stream(params.base.seed, "imitated").choice(rows, wanted, replace=False))
-    return list(store.manifest["clip"].iloc[chosen]), np.stack([store.frames[row] for row in chosen])
 
 
 def _key(params: Params, name: str) -> str:

@@ -1,0 +1,44 @@
+"""Train a policy of Stable-Baselines3 on the translated demonstration's reward.
+
+    python examples/train_with_stable_baselines3.py [STEPS]
+
+Run it from the root of the repository after `dvc repro train@sim`. It trains SAC in one context that no
+evaluation uses, and prints how far from the goal the object ends.
+"""
+
+import sys
+from pathlib import Path
+
+from stable_baselines3 import SAC
+
+from anyview.config import load_params
+from anyview.imitation.demonstrations import imitated_demonstrations
+from anyview.imitation.gym_env import TranslatedReward
+from anyview.runtime.seeds import stream
+from anyview.sim.contexts import sample_contexts
+from anyview.sim.env import PusherEnv
+from anyview.translation.weights import load_translator
+
+
+def main(steps: int) -> None:
+    params = load_params()
+    contexts, _ = sample_contexts(stream(params.base.seed, "example"), 1)
+    pusher = PusherEnv(
+        contexts[0], control=params.sim.control, image_size=params.sim.image_size, render_mode="rgb_array"
+    )
+    translator = load_translator(Path("data/models/sim"))
+    env = TranslatedReward(pusher, translator, imitated_demonstrations(params), params.imitation.reward)
+
+    model = SAC("MlpPolicy", env, gamma=0.8, learning_starts=490, seed=params.base.seed, verbose=1)
+    model.learn(steps)
+
+    observation, info = env.reset()
+    finished = False
+    while not finished:
+        action, _ = model.predict(observation, deterministic=True)
+        observation, _, finished, _, info = env.step(action)
+    print(f"after {steps} steps: {100 * info['distance']:.1f} cm from the goal")
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 10_000)

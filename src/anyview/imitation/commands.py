@@ -1,0 +1,43 @@
+"""The command `anyview watch`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from anyview.clips.video import Codec
+
+CODECS: dict[str, Codec] = {".mp4": "XVID", ".avi": "FFV1"}
+
+
+def watch(
+    cell: Annotated[str, typer.Argument(help="A method that was evaluated, such as ours.")],
+    run: Annotated[int, typer.Option("--run", min=0, help="Which of its runs.")] = 0,
+    output: Annotated[Path, typer.Option("--output", "-o", help="The video, .mp4 or .avi.")] = Path(
+        "watch.mp4"
+    ),
+    size: Annotated[int, typer.Option("--size", min=64, max=1024, help="Width and height in pixels.")] = 512,
+) -> None:
+    """Watch a trained policy act, seen from its own camera."""
+    import numpy as np
+
+    from anyview.clips.video import write_video
+    from anyview.imitation.policies import load_policy
+    from anyview.runtime.errors import AnyviewError
+    from anyview.sim.batch import ACTIONS, TOLERANCE, PusherBatch
+
+    if output.suffix not in CODECS:
+        raise AnyviewError(f"{output}: the output must end in {' or '.join(CODECS)}")
+    if size % 2:
+        raise AnyviewError(f"--size {size}: must be even")
+    policy = load_policy(Path("data/policies") / cell, run)
+    pusher = PusherBatch([policy.context], policy.control, size)
+    observation = pusher.reset()[0]
+    frames = [pusher.render()[0]]
+    for _ in range(ACTIONS):
+        observation = pusher.step(policy.act(observation)[None])[0]
+        frames.append(pusher.render()[0])
+    write_video(output, np.stack(frames), 10.0, CODECS[output.suffix])
+    distance = float(pusher.distance()[0])
+    verdict = "success" if distance < TOLERANCE else "no success"
+    print(f"{output}: {cell} run {run} leaves the object {100 * distance:.1f} cm from the goal: {verdict}")
