@@ -20,13 +20,14 @@ def counts(table: pd.DataFrame) -> dict[str, int]:
     return table["split"].value_counts().to_dict()
 
 
+@settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 1000))
 def test_the_study_has_122_21_and_10_for_any_seed(seed):
     table = split_pairs(clips(71, 1, 5), seed, 122, 21)
     assert counts(table) == {"train": 122, "validation": 21, "extreme": 10}
 
 
-@settings(deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(
     pairs=st.integers(3, 60),
     singles=st.integers(0, 5),
@@ -48,6 +49,7 @@ def test_no_pair_straddles_splits(pairs, singles, extreme, seed, shares):
         assert counts(table)["validation"] <= max(shares[1], 2)
 
 
+@settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 200), before=st.integers(75, 100), added=st.integers(1, 10))
 def test_added_pairs_displace_no_more_pairs_than_they_are(seed, before, added):
     old = split_pairs(clips(before), seed, 122, 20).drop_duplicates("pair").set_index("pair")["split"]

@@ -14,11 +14,6 @@ from anyview.runtime.errors import AnyviewError
 from anyview.runtime.seeds import stream
 
 
-@pytest.fixture(autouse=True)
-def scratch(tmp_path, monkeypatch):
-    monkeypatch.setenv("ANYVIEW_SCRATCH", str(tmp_path / "scratch"))
-
-
 def noise(*shape: int) -> np.ndarray:
     return stream(0, "test", *shape).integers(0, 256, shape, dtype=np.uint8)
 
@@ -72,10 +67,10 @@ def test_one_or_two_workers_decode_the_same_bytes(tmp_path, monkeypatch):
     assert decoded[0] == decoded[1]
 
 
-def test_a_decoded_file_that_was_cut_short_is_made_again(tmp_path):
+def test_a_decoded_file_that_was_cut_short_is_made_again(tmp_path, scratch):
     clips = make_set(tmp_path / "set")
     open_frames(tmp_path / "set")
-    decoded = next((tmp_path / "scratch").rglob("frames.npy"))
+    decoded = next(scratch.rglob("frames.npy"))
     decoded.write_bytes(decoded.read_bytes()[:-1000])
     np.testing.assert_array_equal(open_frames(tmp_path / "set").frames, clips)
 

@@ -48,22 +48,26 @@ def record(
     pair = pair if pair is not None else recording.free_pair(folder)
     recording.check_place(folder, pair, kind, [name for name, _ in named])
     folder.mkdir(parents=True, exist_ok=True)
-    with ExitStack() as stack:
-        cameras = []
-        for name, source in named:
-            cameras.append(recording.Camera(name, source))
-            stack.callback(cameras[-1].close)
-        if preview:
-            address = stack.enter_context(serving(cameras, port))
-            print(f"live views at {address}; press Enter to film, Ctrl-C to leave", flush=True)
-            sys.stdin.readline()
-        for view in cameras:
-            still = folder / f"{pair}-{view.name}.png"
-            write_png(still, view.newest()[0])
-            print(f"view of camera {view.name}: {still}", flush=True)
-        _count_down(delay)
-        with track(f"film {pair}", recording.ticks(seconds)) as progress:
-            paths = recording.film(cameras, folder, pair, kind, seconds, progress.advance)
+    try:
+        with ExitStack() as stack:
+            views = []
+            for name, source in named:
+                views.append(recording.Camera(name, source))
+                stack.callback(views[-1].close)
+            if preview:
+                address = stack.enter_context(serving(views, port))
+                print(f"live views at {address}; press Enter to film, Ctrl-C to leave", flush=True)
+                sys.stdin.readline()
+            for view in views:
+                still = folder / f"{pair}-{view.name}.png"
+                write_png(still, view.newest()[0])
+                print(f"view of camera {view.name}: {still}", flush=True)
+            _count_down(delay)
+            with track(f"film {pair}", recording.ticks(seconds)) as progress:
+                paths = recording.film(views, folder, pair, kind, seconds, progress.advance)
+    except KeyboardInterrupt:
+        print("interrupted: no clip was kept", file=sys.stderr)
+        raise
     print(f"{', '.join(path.name for path in paths)}: added to {folder / 'manifest.csv'}")
 
 

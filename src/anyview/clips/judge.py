@@ -1,8 +1,8 @@
 """Reading one raw clip: even frames out of whatever a camera left, or the reason why not."""
 
-import math
 from collections.abc import Iterator
 from pathlib import Path
+from time import monotonic
 
 import cv2
 import numpy as np
@@ -15,6 +15,8 @@ from anyview.runtime.errors import AnyviewError
 
 LONGEST = 1.5  # a raw clip may be this many times as long as a finished one
 MAX_RATE = 250.0  # frames a second
+PATIENCE = 120.0  # seconds of decoding, a hundred times what a clip takes
+LONGEST_GAP = 2.5  # output periods without a source frame
 MAX_REPEATS = 0.1  # of a clip's frames may show their predecessor again: the camera was a little slow
 STILL_SECONDS = 2.0  # longer without a single changed pixel: the camera hung
 MIN_MOTION = 1.0  # grey levels, the mean over a picture, between the first frame and the most different one
@@ -29,8 +31,8 @@ class Refused(Exception):
 def read_clip(path: Path, limits: Ingest) -> np.ndarray:
     """The finished frames, uint8 RGB (frames, size, size, 3), of a raw clip; raises ``Refused``.
 
-    Output frame k is the first source frame that comes later than half a source period before k / rate: the
-    nearest one where the camera kept time.
+    Output frame k is the first unused source frame within a source period of k / rate; where the camera left
+    a gap, the frame before the gap stands again.
     """
     try:
         check_container(path)
@@ -60,30 +62,26 @@ def _sidecar_times(path: Path) -> np.ndarray | None:
 
 
 def _decode(path: Path, sidecar: np.ndarray | None, limits: Ingest) -> np.ndarray:
-    length = limits.frames / limits.rate
     frames = np.empty((limits.frames, limits.size, limits.size, 3), np.uint8)
     filled = used = decoded = 0
+    time = 0.0
     with open_capture(path) as (capture, messages):
         _check_picture_size(capture)
         period = _source_period(capture, sidecar, limits.rate)
-        last = 0.0
-        for time in _grab_all(capture, sidecar):
+        for time in _grab_all(capture, sidecar, limits):
             decoded += 1
-            if time > LONGEST * length or decoded > LONGEST * length * MAX_RATE:
-                raise Refused(f"longer than {LONGEST * length:g} s")
-            due = min(math.floor((time + period / 2) * limits.rate + 1e-6) + 1, limits.frames)
-            if due > filled:
-                if time - filled / limits.rate > 1.5 / limits.rate + period / 2:
-                    raise Refused(f"no frame between {last:.2f} s and {time:.2f} s")
-                frames[filled:due] = _shrink(capture.retrieve()[1], limits.size)
-                filled, used = due, used + 1
-            last = time
+            while 0 < filled < limits.frames and time > filled / limits.rate + period:
+                frames[filled] = frames[filled - 1]
+                filled += 1
+            if filled < limits.frames and time >= filled / limits.rate - 0.75 * period:
+                frames[filled] = _shrink(capture.retrieve()[1], limits.size)
+                filled, used = filled + 1, used + 1
         declared = capture.get(cv2.CAP_PROP_FRAME_COUNT)
         damage = messages.damage()
     if damage or decoded < max(declared - max(2.0, 0.02 * declared), 1):
         raise Refused(f"damaged: {damage or f'{decoded} of {declared:.0f} frames can be decoded'}")
     if filled < limits.frames:
-        raise Refused(f"{last + period:.2f} s long, {length:g} s are needed")
+        raise Refused(f"{time + period:.2f} s long, {limits.frames / limits.rate:g} s are needed")
     if used < (1 - MAX_REPEATS) * limits.frames:
         raise Refused(f"slower than {limits.rate:g} frames a second")
     return frames
@@ -96,8 +94,10 @@ def _check_picture_size(capture: cv2.VideoCapture) -> None:
         raise Refused(f"a picture of {width} x {height}")
 
 
-def _grab_all(capture: cv2.VideoCapture, sidecar: np.ndarray | None) -> Iterator[float]:
+def _grab_all(capture: cv2.VideoCapture, sidecar: np.ndarray | None, limits: Ingest) -> Iterator[float]:
     """Grab frame after frame and yield its time: seconds by the sidecar, else from the first frame."""
+    longest = LONGEST * limits.frames / limits.rate
+    deadline = monotonic() + PATIENCE
     start = last = 0.0
     decoded = 0
     while capture.grab():
@@ -105,10 +105,17 @@ def _grab_all(capture: cv2.VideoCapture, sidecar: np.ndarray | None) -> Iterator
             raise Refused(f"its sidecar lists {decoded} frames, the clip has more")
         time = capture.get(cv2.CAP_PROP_POS_MSEC) / 1e3 if sidecar is None else float(sidecar[decoded])
         if sidecar is None and decoded == 0:
-            start = last = time
-        if time < last:
+            start = time
+        time -= start
+        if time < last and decoded:
             raise Refused("its frames' times run backwards")
-        yield time - start
+        if time - last > LONGEST_GAP / limits.rate:
+            raise Refused(f"no frame between {last:.2f} s and {time:.2f} s")
+        if time > longest or decoded > longest * MAX_RATE:
+            raise Refused(f"longer than {longest:g} s")
+        if monotonic() > deadline:
+            raise Refused(f"takes more than {PATIENCE:g} s to decode")
+        yield time
         decoded, last = decoded + 1, time
     if sidecar is not None and decoded != len(sidecar):
         raise Refused(f"its sidecar lists {len(sidecar)} frames, the clip has {decoded}")

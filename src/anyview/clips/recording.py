@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 import pandas as pd
 
+from anyview.clips.ffmpeg import listening
 from anyview.clips.manifests import KINDS, RAW_COLUMNS, read_table, times_file
 from anyview.clips.video import VideoWriter, open_capture
 from anyview.runtime.errors import AnyviewError
@@ -36,6 +37,7 @@ class Camera:
         self._changed = threading.Condition()
         self._ended = False
         if source.isdigit():
+            self._stack.enter_context(listening())  # OpenCV's warnings would spoil the display
             self._capture = _open_device(int(source))
             self._stack.callback(self._capture.release)
         else:
@@ -138,7 +140,7 @@ def film(
     seconds: float,
     advance: Callable[[], object],
 ) -> list[Path]:
-    """Film ``seconds`` with every camera at ``RATE`` and add the clips to the folder's manifest; returns them.
+    """Film ``seconds`` with every camera at ``RATE``, add the clips to the folder's manifest and return them.
 
     Each clip gets a sidecar with its frames' times, on one clock for all cameras. ``advance`` is called for
     each of ``ticks(seconds)``. On any error, Ctrl-C included, manifest and folder stay as they were.

@@ -1,0 +1,340 @@
+"""Ingest: any container, rate and size into 80 even frames; every clip is judged, none stops the others."""
+
+import os
+import re
+import resource
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from raw_clips import LIMITS, damaged, pictures, write_raw
+
+from anyview.clips.ingest import Candidate, Verdict, ingest_clip, publish, read_candidates, settle
+from anyview.clips.judge import Refused, read_clip
+from anyview.clips.manifests import propose_manifest
+from anyview.clips.video import read_video
+from anyview.runtime.errors import AnyviewError
+
+
+def candidate(file: str, pair: str = "", kind: str = "standard") -> Candidate:
+    return Candidate(Path(file).stem, file, pair or Path(file).stem, "", kind)
+
+
+def judge(source: Path, file: str, folder: Path, limits=LIMITS) -> str:
+    folder.mkdir(exist_ok=True)
+    return ingest_clip(source, folder, candidate(file), limits).reason
+
+
+def shrunk(frame: np.ndarray) -> np.ndarray:
+    """The middle square at 48 x 48: enlarged to a multiple of that, then the mean of each block."""
+    height, width = frame.shape[:2]
+    left = (width - height) // 2
+    square = cv2.resize(frame[:, left : left + height], (48 * 15, 48 * 15), interpolation=cv2.INTER_NEAREST)
+    return square.reshape(48, 15, 48, 15, 3).mean(axis=(1, 3))
+
+
+@pytest.mark.parametrize(
+    ("name", "codec", "width", "height", "fps"),
+    [
+        ("clip.avi", "XVID", 160, 90, 10.0),
+        ("clip.avi", "MJPG", 128, 128, 12.5),
+        ("clip.mp4", "mp4v", 320, 180, 29.97),
+        ("clip.mov", "mp4v", 90, 160, 25.0),
+        ("clip.mkv", "XVID", 200, 150, 15.0),
+        ("clip.webm", "VP80", 96, 64, 20.0),
+    ],
+)
+def test_any_container_codec_size_and_rate_becomes_the_right_frames(
+    tmp_path, name, codec, width, height, fps
+):
+    frames = pictures(round(8.1 * fps), width, height)
+    clip = read_clip(write_raw(tmp_path / name, frames, fps, codec), LIMITS)
+    assert clip.shape == (80, 48, 48, 3)
+    assert clip.dtype == np.uint8
+    side = min(width, height)
+    top, left = (height - side) // 2, (width - side) // 2
+    for k in (0, 13, 40, 79):
+        nearest = frames[round(k / 10 * fps)][top : top + side, left : left + side]
+        assert np.abs(clip[k] - shrunk(nearest)).mean() < 6
+
+
+def test_frames_are_resampled_by_the_sidecar_and_not_by_the_header(tmp_path):
+    frames = pictures(120)
+    times = np.cumsum(np.tile([0.05, 0.10, 0.0505], 40)) - 0.05
+    path = write_raw(tmp_path / "clip.avi", frames, fps=25.0)
+    pd.DataFrame({"seconds": times}).to_csv(tmp_path / "clip.times.csv", index=False)
+    clip = read_clip(path, LIMITS)
+    small = np.stack([shrunk(frame) for frame in frames])
+    for k in (0, 10, 33, 79):
+        chosen = np.argmin(np.abs(clip[k] - small).mean(axis=(1, 2, 3)))
+        assert abs(times[chosen] - k / 10) <= 0.051
+
+
+REFUSALS = {
+    "black": (lambda x: np.zeros_like(x), 10.0, "black or of one colour"),
+    "grey": (
+        lambda x: np.repeat(x.mean(axis=-1, keepdims=True).astype(np.uint8), 3, axis=-1),
+        10.0,
+        "without colour",
+    ),
+    "still": (lambda x: np.repeat(x[:1], len(x), axis=0), 10.0, "nothing moves"),
+    "frozen": (lambda x: np.concatenate([x[:50], np.repeat(x[50:51], 32, axis=0)]), 10.0, "frozen for 2.9 s"),
+    "short": (lambda x: x[:60], 10.0, "6.00 s long, 8 s are needed"),
+    "slow": (lambda x: x[:41], 5.0, "slower than 10 frames a second"),
+    "long": (lambda x: np.concatenate([x, x]), 10.0, "longer than 12 s"),
+    "gap": (lambda x: x[:20], 2.0, "no frame between 0.00 s and 0.50 s"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSALS)
+def test_what_no_demonstration_looks_like_is_refused_with_the_reason(tmp_path, name):
+    change, fps, reason = REFUSALS[name]
+    path = write_raw(tmp_path / "clip.avi", change(pictures()), fps, "FFV1")
+    with pytest.raises(Refused, match=reason):
+        read_clip(path, LIMITS)
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        ("seconds\n0\n0.1\n", "lists 2 frames"),
+        ("seconds\n" + "\n".join(str(i / 10) for i in range(99)), "lists 99 frames"),
+        ("seconds\n" + "\n".join(str(-i / 10) for i in range(82)), "do not increase"),
+        ("seconds\n" + "nan\n" * 82, "do not increase"),
+        ("seconds\n" + "soon\n" * 82, "not a table of seconds"),
+        ("minutes\n0\n", "not a table of seconds"),
+        ("", "not a table of seconds"),
+    ],
+)
+def test_a_sidecar_that_does_not_fit_is_refused(tmp_path, content, reason):
+    path = write_raw(tmp_path / "clip.avi", pictures())
+    (tmp_path / "clip.times.csv").write_text(content)
+    with pytest.raises(Refused, match=reason):
+        read_clip(path, LIMITS)
+
+
+def test_paths_that_leave_the_folder_or_are_no_clips_are_refused(tmp_path):
+    raw, work = tmp_path / "raw", tmp_path / "work"
+    write_raw(tmp_path / "outside.avi", pictures())
+    raw.mkdir()
+    (raw / "link.avi").symlink_to(tmp_path / "outside.avi")
+    (raw / "loop.avi").symlink_to(raw / "loop.avi")
+    (raw / "folder.avi").mkdir()
+    (raw / "empty.avi").touch()
+    os.mkfifo(raw / "pipe.avi")
+    (raw / "text.avi").write_text("#EXTM3U\n#EXTINF:8,\n../outside.avi\n")
+    (raw / "list.m3u8").write_text("#EXTM3U\n#EXTINF:8,\n../outside.avi\n#EXT-X-ENDLIST\n")
+    (raw / "list.ffconcat").write_text("ffconcat version 1.0\nfile ../outside.avi\n")
+    reasons = {
+        "../outside.avi": "leaves the folder",
+        str(tmp_path / "outside.avi"): "leaves the folder",
+        "link.avi": "leaves the folder",
+        "loop.avi": "path cannot be used|no such file",
+        "folder.avi": "not a file",
+        "pipe.avi": "not a file",
+        "empty.avi": "an empty file",
+        "absent.avi": "no such file",
+        "nul\0.avi": "path cannot be used",
+        "x" * 5000: "path cannot be used",
+        "text.avi": "not a video",
+        "list.m3u8": "not a video",
+        "list.ffconcat": "not a video",
+        "concat:text.avi": "no such file",
+        "http://127.0.0.1:9/x.avi": "no such file",
+    }
+    for file, reason in reasons.items():
+        assert re.search(reason, judge(raw, file, work)), file
+    assert "kind 'odd'" in ingest_clip(raw, work, candidate("text.avi", kind="odd"), LIMITS).reason
+
+
+def test_a_file_above_the_stated_size_is_refused(tmp_path):
+    path = write_raw(tmp_path / "clip.avi", pictures())
+    small = LIMITS.model_copy(update={"max_megabytes": path.stat().st_size / 1e6 - 0.001})
+    assert judge(tmp_path, "clip.avi", tmp_path / "work", small).startswith("larger than")
+
+
+@pytest.mark.parametrize(
+    ("name", "codec", "sides", "claimed"),
+    [
+        ("clip.avi", "XVID", b"\x40\x01\0\0\xb4\0\0\0", b"\xa0\x86\1\0\xa0\x86\1\0"),  # 100,000 x 100,000
+        ("clip.mkv", "XVID", b"\xb0\x82\x01\x40", b"\xb0\x82\xff\xff"),
+        ("clip.mp4", "mp4v", b"\x01\x40\0\0\0\xb4\0\0", b"\xff\xff\0\0\xff\xff\0\0"),
+    ],
+)
+def test_a_header_that_claims_a_giant_picture_is_refused(tmp_path, name, codec, sides, claimed):
+    path = write_raw(tmp_path / name, pictures(width=320, height=180), codec=codec)
+    content = path.read_bytes()
+    assert sides in content
+    path.write_bytes(content.replace(sides, claimed))
+    assert "claims a picture of" in judge(tmp_path, name, tmp_path / "work")
+
+
+@pytest.mark.parametrize("side", [3000, 60_000])
+def test_a_frame_that_claims_a_giant_picture_is_refused_without_the_memory(tmp_path, side):
+    path = write_raw(tmp_path / "clip.avi", pictures(), codec="MJPG")
+    start = b"\xff\xc0\x00\x11\x08"  # of a JPEG's frame header; height and width follow
+    claimed = start + side.to_bytes(2, "big") * 2
+    path.write_bytes(path.read_bytes().replace(start + b"\0\x5a\0\xa0", claimed))
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    assert "damaged" in judge(tmp_path, "clip.avi", tmp_path / "work")
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 200_000  # kilobytes
+
+
+def test_a_clip_that_takes_forever_to_decode_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("anyview.clips.judge.PATIENCE", 0.0)
+    with pytest.raises(Refused, match="to decode"):
+        read_clip(write_raw(tmp_path / "clip.avi", pictures()), LIMITS)
+
+
+@pytest.mark.parametrize(
+    ("name", "codec", "count"), [("clip.avi", "XVID", 80), ("clip.mp4", "mp4v", 60), ("clip.mkv", "XVID", 60)]
+)
+def test_two_hundred_damaged_clips_are_judged(tmp_path, name, codec, count):
+    """Structural damage is refused; what is accepted has 80 frames that decode and change."""
+    content = write_raw(tmp_path / name, pictures(), codec=codec).read_bytes()
+    accepted = 0
+    for index, (way, altered) in enumerate(damaged(content, count, seed=1)):
+        file = f"{index:03d}{Path(name).suffix}"
+        (tmp_path / file).write_bytes(altered)
+        reason = judge(tmp_path, file, tmp_path / "work")
+        if way in ("cut", "emptied", "other"):
+            assert reason, f"{way} {index} was accepted"
+        if not reason:
+            accepted += 1
+            frames = read_video(tmp_path / "work" / f"{index:03d}.avi")
+            assert frames.shape == (80, 48, 48, 3)
+            assert len({frame.tobytes() for frame in frames}) > 60
+    assert 0 < accepted < 0.4 * count
+
+
+def test_duplicates_and_halves_of_pairs_are_refused_but_singles_are_not():
+    candidates = [candidate("a.avi", "1"), candidate("b.avi", "1"), candidate("c.avi", "2")]
+    candidates += [candidate("d.avi", "3"), candidate("e.avi", "3"), candidate("f.avi")]
+    verdicts = [Verdict("", {}, "A"), Verdict("damaged: cut short"), Verdict("", {}, "C")]
+    verdicts += [Verdict("", {}, "D"), Verdict("", {}, "C"), Verdict("", {}, "F")]
+    assert [verdict.reason for verdict in settle(candidates, verdicts)] == [
+        "the other view of its pair was refused",
+        "damaged: cut short",
+        "",
+        "the other view of its pair was refused",
+        "a duplicate of c.avi",
+        "",
+    ]
+
+
+def test_a_folder_without_a_manifest_gets_one_proposed(tmp_path):
+    names = [
+        "day1/push-left.mp4",
+        "day1/push-right.mp4",
+        "extreme distractor/x_a.avi",
+        "solo.mov",
+        "notes.txt",
+    ]
+    for name in names:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
+    with pytest.raises(AnyviewError, match=r"manifest\.csv: no such file; check manifest\.proposed\.csv"):
+        read_candidates(tmp_path)
+    (tmp_path / "manifest.proposed.csv").rename(tmp_path / "manifest.csv")
+    rows = {c.file: (c.pair, c.camera, c.kind) for c in read_candidates(tmp_path)}
+    assert rows == {
+        "day1/push-left.mp4": ("day1/push", "left", "standard"),
+        "day1/push-right.mp4": ("day1/push", "right", "standard"),
+        "extreme distractor/x_a.avi": ("extreme distractor/x", "a", "extreme_distractor"),
+        "solo.mov": ("solo", "", "standard"),
+    }
+    assert propose_manifest(tmp_path / "day1")["file"].tolist() == ["push-left.mp4", "push-right.mp4"]
+
+
+@settings(max_examples=60, deadline=None)
+@given(files=st.lists(st.text(min_size=1, max_size=12), min_size=1, max_size=6))
+def test_any_names_give_ids_that_are_unique_plain_file_names(tmp_path_factory, files):
+    folder = tmp_path_factory.mktemp("raw")
+    pd.DataFrame({"file": files, "pair": "", "camera": "", "kind": "standard"}).to_csv(
+        folder / "manifest.csv", index=False
+    )
+    try:
+        ids = [c.clip for c in read_candidates(folder)]
+    except AnyviewError:  # a name that CSV cannot carry
+        return
+    assert len({clip.lower() for clip in ids}) == len(ids)
+    assert all(Path(clip).name == clip and not clip.startswith(".") for clip in ids)
+
+
+def test_an_earlier_result_counts_only_while_clip_and_result_are_unchanged(tmp_path):
+    work = tmp_path / "work"
+    write_raw(tmp_path / "clip.avi", pictures())
+    assert judge(tmp_path, "clip.avi", work) == ""
+    made = (work / "clip.avi").stat().st_mtime_ns
+    assert judge(tmp_path, "clip.avi", work) == ""
+    assert (work / "clip.avi").stat().st_mtime_ns == made
+    (work / "clip.avi").write_bytes(b"half")
+    assert judge(tmp_path, "clip.avi", work) == ""
+    assert read_video(work / "clip.avi").shape == (80, 48, 48, 3)
+    write_raw(tmp_path / "clip.avi", pictures()[:50])
+    assert "are needed" in judge(tmp_path, "clip.avi", work)
+
+
+def test_published_clips_open_as_a_set(tmp_path):
+    from anyview.clips.store import open_frames
+
+    for name, seed in (("b.avi", 1), ("a.avi", 2)):
+        write_raw(tmp_path / name, pictures(seed=seed))
+    candidates = [candidate("b.avi", "1"), candidate("gone.avi"), candidate("a.avi", "2", "distractor")]
+    (work := tmp_path / "work").mkdir()
+    verdicts = settle(candidates, [ingest_clip(tmp_path, work, c, LIMITS) for c in candidates])
+    (out := tmp_path / "out").mkdir()
+    assert publish(out, work, candidates, verdicts) == (2, 1)
+    store = open_frames(out)
+    assert store.manifest["clip"].tolist() == ["b", "a"]
+    assert store.manifest.columns.tolist() == ["clip", "file", "pair", "camera", "kind"]
+    assert pd.read_csv(out / "refused.csv").to_dict("records") == [
+        {"file": "gone.avi", "reason": "no such file"}
+    ]
+    for row, clip in zip(store.manifest.itertuples(), store.frames, strict=True):
+        raw = read_clip(tmp_path / row.file, LIMITS)
+        assert np.abs(raw.astype(int) - clip).mean() < 8  # XVID
+
+
+def test_the_stage_takes_a_mixed_folder_and_one_bad_clip_stops_nothing(tmp_path, root):
+    raw = tmp_path / "data" / "real" / "raw"
+    rows = []
+    kinds = ((".mp4", "mp4v", 30.0), (".mov", "mp4v", 25.0), (".mkv", "XVID", 12.0), (".avi", "MJPG", 10.0))
+    for index, (suffix, codec, fps) in enumerate(kinds):
+        pair, camera = f"push{index // 2}", ("left", "right")[index % 2]
+        frames = pictures(round(8.1 * fps), *((160, 90), (128, 96))[index % 2], seed=index)
+        write_raw(raw / f"{pair}-{camera}{suffix}", frames, fps, codec)
+        rows.append((f"{pair}-{camera}{suffix}", pair, camera, "standard"))
+    (raw / "bad.avi").write_bytes(b"RIFF")
+    rows.append(("bad.avi", "bad", "", "standard"))
+    pd.DataFrame(rows, columns=["file", "pair", "camera", "kind"]).to_csv(raw / "manifest.csv", index=False)
+    params = (root / "params.yaml").read_text().replace("source: surrogate", "source: recorded", 1)
+    (tmp_path / "params.yaml").write_text(params)
+    outputs = []
+    for workers in ("1", "2"):
+        shutil.rmtree(tmp_path / "data" / "real" / "clips", ignore_errors=True)
+        for stage in (["ingest.py"], ["split.py", "real"]):
+            done = subprocess.run(
+                [sys.executable, str(root / "stages" / stage[0]), *stage[1:]],
+                cwd=tmp_path,
+                env=os.environ | {"ANYVIEW_WORKERS": workers, "ANYVIEW_SCRATCH": str(tmp_path / workers)},
+                capture_output=True,
+                text=True,
+                check=False,
+            )
+            assert done.returncode == 0, done.stderr
+            assert done.stderr == ""
+        files = sorted((tmp_path / "data" / "real" / "clips").iterdir())
+        outputs.append({path.name: path.read_bytes() for path in files})
+    assert outputs[0] == outputs[1]
+    assert pd.read_csv(tmp_path / "data/real/clips/refused.csv")["file"].tolist() == ["bad.avi"]
+    split = pd.read_csv(tmp_path / "data/splits/real.csv")
+    assert split["split"].value_counts().to_dict() == {"train": 2, "validation": 2}
+    assert (split.groupby("pair")["split"].nunique() == 1).all()
