@@ -36,10 +36,10 @@ class Judged:
 def translate_clip(model: ContextTranslator, clip: np.ndarray, context: np.ndarray) -> np.ndarray:
     """``clip``, uint8 (T, H, W, 3), as the context of the frame ``context`` (H, W, 3) would show it."""
     device = next(model.parameters()).device
-    z2, skips = model.encode_context(to_input(torch.from_numpy(context)[None].to(device)))
+    z2, skips = model.encode_context(to_input(context[None]).to(device))
     translated = []
     for frames in np.array_split(clip, -(-len(clip) // 64)):
-        z1 = model.encode_expert(to_input(torch.from_numpy(frames).to(device)))
+        z1 = model.encode_expert(to_input(frames).to(device))
         translated.append(to_frames(model.decode(model.translate(z1, z2.expand_as(z1)), skips)))
     return np.concatenate(translated)
 
@@ -52,7 +52,7 @@ def judge(model: ContextTranslator, dataset: Dataset, source: int, target: int) 
     the last frame alone (figure 18).
     """
     device = next(model.parameters()).device
-    expert, true = (to_input(torch.from_numpy(dataset.frames[clip]).to(device)) for clip in (source, target))
+    expert, true = (to_input(dataset.frames[clip]).to(device) for clip in (source, target))
     z2, skips = model.encode_context(true[:1])
     z_true = model.encode_expert(true)
     z3 = model.translate(model.encode_expert(expert), z2.expand_as(z_true))

@@ -42,7 +42,7 @@ def _rises(
 ) -> np.ndarray:
     """Mean rise of L_tr (T,) when each frame is replaced by the ones ``offsets`` later, around the end."""
     device = next(model.parameters()).device
-    expert, true = (to_input(torch.from_numpy(dataset.frames[clip]).to(device)) for clip in pair)
+    expert, true = (to_input(dataset.frames[clip]).to(device) for clip in pair)
     z1 = model.encode_expert(expert)
     z2, skips = model.encode_context(true[:1])
     shares = model.decoder.shares(skips)

@@ -65,8 +65,8 @@ ARCHITECTURES: dict[ArchitectureName, Architecture] = {
 
 def to_input(frames: np.ndarray | Tensor) -> Tensor:
     """Network input (..., 3, H, W) in [-1, 1], float32, of uint8 ``frames`` (..., H, W, 3)."""
-    pixels = torch.as_tensor(frames).movedim(-1, -3)
-    return pixels.to(torch.float32).div_(127.5).sub_(1.0)
+    pixels = frames if isinstance(frames, Tensor) else torch.tensor(frames)
+    return pixels.movedim(-1, -3).to(torch.float32).div_(127.5).sub_(1.0)
 
 
 def to_frames(output: Tensor) -> np.ndarray:

@@ -136,16 +136,17 @@ class Trainer:
             index, key = name.split("/")
             parameter = self._parameters[int(index)]
             moment = value.shape == parameter.shape
-            state.setdefault(int(index), {})[key] = _laid_out_as(parameter, value) if moment else value
+            state.setdefault(int(index), {})[key] = _laid_out_as(parameter if moment else value, value)
         self._optimizer.load_state_dict(self._optimizer.state_dict() | {"state": state})
 
     def _frames(self, pairs: FramePairs) -> tuple[Tensor, Tensor, Tensor]:
-        expert, context, target = (torch.from_numpy(f).to(self._device) for f in pairs.frames(self._dataset))
+        expert, context, target = (torch.tensor(f, device=self._device) for f in pairs.frames(self._dataset))
         return to_input(expert), to_input(context), to_input(target)
 
     def _autocast(self) -> torch.autocast:
         reduced = self._recipe.training.precision == "bfloat16"
-        return torch.autocast(self._device.type, torch.bfloat16, enabled=reduced)
+        # All threads share the cache of converted weights: what a part found there would be up to chance.
+        return torch.autocast(self._device.type, torch.bfloat16, enabled=reduced, cache_enabled=False)
 
 
 def learning_rate(training: Training, iteration: int, iterations: int) -> float:
@@ -162,9 +163,9 @@ def _optimizer(recipe: Recipe, parameters: list[torch.nn.Parameter]) -> torch.op
     return torch.optim.Adadelta(parameters, lr=rate, foreach=True)
 
 
-def _laid_out_as(parameter: Tensor, value: Tensor) -> Tensor:
-    """A copy with the strides of ``parameter``, which the fused optimiser takes for granted."""
-    return torch.empty_like(parameter).copy_(value)
+def _laid_out_as(like: Tensor, value: Tensor) -> Tensor:
+    """A copy with the strides of ``like``, a parameter: the fused optimiser takes them for granted."""
+    return torch.empty_like(like).copy_(value)
 
 
 def _weighted_sum(
