@@ -27,7 +27,8 @@ def main(steps: int) -> None:
         contexts[0], control=params.sim.control, image_size=params.sim.image_size, render_mode="rgb_array"
     )
     translator = load_translator(Path("data/models/sim"))
-    env = TranslatedReward(pusher, translator, imitated_demonstrations(params), params.imitation.reward)
+    _, demonstrations = imitated_demonstrations(params)
+    env = TranslatedReward(pusher, translator, demonstrations, params.imitation.reward)
 
     model = SAC("MlpPolicy", env, gamma=0.8, learning_starts=490, seed=params.base.seed, verbose=1)
     model.learn(steps)

@@ -14,8 +14,8 @@ DEMONSTRATIONS = Path("data/sim/diverse")
 SPLIT = Path("data/splits/sim-diverse.csv")
 
 
-def imitated_demonstrations(params: Params) -> np.ndarray:
-    """``imitation.reward.demonstrations`` clips, uint8 RGB (m, 50, H, W, 3).
+def imitated_demonstrations(params: Params) -> tuple[list[str], np.ndarray]:
+    """``imitation.reward.demonstrations`` clips: their ids, and their frames, uint8 RGB (m, 50, H, W, 3).
 
     Raises AnyviewError where the split holds out fewer, or the frames are of another size than the agents'.
     """
@@ -31,5 +31,5 @@ def imitated_demonstrations(params: Params) -> np.ndarray:
     made, size = store.frames.shape[2], params.sim.image_size
     if made != size:
         raise AnyviewError(f"{DEMONSTRATIONS}: frames of {made} pixels, but sim.image_size is {size}")
-    chosen = stream(params.base.seed, "imitated").choice(rows, wanted, replace=False)
-    return np.stack([store.frames[row] for row in sorted(chosen)])
+    chosen = np.sort(stream(params.base.seed, "imitated").choice(rows, wanted, replace=False))
+    return list(store.manifest["clip"].iloc[chosen]), np.stack([store.frames[row] for row in chosen])
