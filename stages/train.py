@@ -5,8 +5,6 @@ Usage: python stages/train.py CELL [DATASET]
 
 from pathlib import Path
 
-from anyview.translation.embedding import train_embedding
-
 from anyview.config import EmbeddingCell, load_params
 from anyview.runtime.errors import AnyviewError, run_stage
 from anyview.translation.sampling import check_dataset
@@ -25,6 +23,8 @@ def main(arguments: list[str]) -> None:
     check_dataset(name, cell.dataset, arguments[1:])
     output = Path("data/models") / name
     if isinstance(cell, EmbeddingCell):
+        from anyview.translation.embedding import train_embedding
+
         train_embedding(name, cell, params.translation.training, params.base.seed, output)
     else:
         train_translator(Recipe(name, cell, params.translation.training, params.base.seed), output)

@@ -17,7 +17,7 @@ def disc_clips(count: int, size: int = SIZE, length: int = LENGTH, seed: int = 0
         clip[:, (abs(rows - goal[0]) < 2) & (abs(columns - goal[1]) < 2)] = (220, 30, 30)
         for t, frame in enumerate(clip):
             y, x = start + (goal - start) * t / (length - 1)
-            frame[(rows - y) ** 2 + (columns - x) ** 2 < (0.12 * size) ** 2] = (40, 60, 230)
+            frame[(rows - y) ** 2 + (columns - x) ** 2 < (0.18 * size) ** 2] = (40, 60, 230)
     return clips
 
 

@@ -1,6 +1,5 @@
 """A user's own footage as input of a translator: the middle square, shrunk to the model's size."""
 
-from itertools import islice
 from pathlib import Path
 
 import cv2
@@ -40,7 +39,9 @@ def _read(path: Path, size: int, most: int) -> tuple[np.ndarray, float]:
         except Damaged as found:
             raise AnyviewError(f"{path}: damaged: {found}") from None
         rate = capture.get(cv2.CAP_PROP_FPS)
-        frames = [_square(frame, size) for frame in islice(iter(lambda: capture.read()[1], None), most)]
+        frames: list[np.ndarray] = []
+        while len(frames) < most and (frame := capture.read()[1]) is not None:
+            frames.append(_square(frame, size))
         damage = messages.damage()
     if damage or not frames:
         raise AnyviewError(f"{path}: damaged: {damage or 'no frame can be decoded'}")
