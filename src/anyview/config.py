@@ -1,9 +1,9 @@
-"""``params.yaml`` as strict typed models: an unknown, ill-typed or impossible key is refused by its dotted name."""
+"""``params.yaml`` as strict typed models: an unknown or impossible key is refused by its dotted name."""
 
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
@@ -55,7 +55,7 @@ class Film(Block):
     pairs: Count = Field(description="pairs of two views of one demonstration")
     singles: int = Field(ge=0, description="demonstrations that one camera saw")
     extreme_pairs: int = Field(ge=0, description="pairs of extreme distractor clips, for validation only")
-    width: int = Field(ge=160, le=1920, multiple_of=16, description="width of a raw frame; the height is 9/16 of it")
+    width: int = Field(ge=160, le=1920, multiple_of=32, description="width of a raw frame; the height is 9/16 of it")
 
 
 class Ingest(Block):
@@ -84,10 +84,17 @@ class SplitSim(Block):
 
 
 class SplitReal(Block):
-    """Split of the real clips, by pair. Counts that the data cannot fill become fractions of what there is."""
+    """Split of the real clips, by pair. Counts that the data cannot fill are taken as proportions."""
 
-    train: Count = Field(description="clips to train on")
-    validation: Count = Field(description="clips held out")
+    train: Positive = Field(description="clips to train on: a count, or a fraction such as 0.85")
+    validation: Positive = Field(description="clips held out: a count, or a fraction")
+
+    @field_validator("train", "validation")
+    @classmethod
+    def _count_or_fraction(cls, value: float) -> float:
+        if value >= 1 and value % 1 != 0:
+            raise ValueError("must be a whole count or a fraction below 1")
+        return value
 
 
 class Split(Block):
@@ -138,14 +145,25 @@ class Training(Block):
 
     batch_size: Count
     learning_rate: Positive
+    schedule: Literal["constant", "cosine"] = Field(description="the rate stays, or falls to 0 along a cosine")
+    precision: Literal["bfloat16", "float32"] = Field(description="of the matrix products; weights stay float32")
     validation_every: Count = Field(description="iterations between validations")
     validation_pairs: Count = Field(description="frame pairs in the fixed validation set")
+
+
+class Evaluation(Block):
+    """Stage `translate`, shared by every translator cell."""
+
+    clips: Count = Field(description="validation clips that are translated, at most")
+    shown: Count = Field(description="clips of each split drawn as strips and written as videos, at most")
+    permutations: Count = Field(description="other times that stand in for a frame when it is weighted")
 
 
 class Translation(Block):
     """Stages `train` and `translate`."""
 
     training: Training
+    evaluation: Evaluation
     cells: dict[str, Annotated[TranslatorCell | EmbeddingCell, Field(discriminator="method")]]
 
 
@@ -182,7 +200,8 @@ class DDPG(Block):
 class TRPO(Block):
     """Trust-region policy optimisation."""
 
-    hidden: list[Count] = Field(min_length=1)
+    hidden: list[Count] = Field(min_length=1, description="widths of the policy")
+    initial_std: Positive = Field(description="of the Gaussian policy, in units of the action range")
     batch_episodes: Count = Field(description="episodes per policy step")
     discount: Discount
     gae_lambda: Fraction
@@ -274,6 +293,9 @@ def _explain(error: ValidationError) -> str:
         message = "missing key"
     else:
         message = first["msg"].removeprefix("Value error, ")
+        if first["type"].startswith("union_tag"):
+            key += ".method"
+            message = f"Input should be {' or '.join(repr(tag) for tag in sorted(tags))}"
         if not isinstance(first["input"], dict):
             message += f", got {first['input']!r}"
     return f"{key}: {message}" + (f" (and {len(others)} more)" if others else "")
