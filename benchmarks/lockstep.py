@@ -1,0 +1,184 @@
+"""Training in lockstep against Stable-Baselines3's DDPG, and where the time of a lockstep step goes.
+
+- environment steps per second, updates included, summed over 15 runs: ours in two groups on two cores,
+  against Stable-Baselines3 training runs one after another, with one thread or all, whichever is faster. Both
+  have the same environment, translated reward, network, batch and number of updates;
+- one core's time in a lockstep step of a group of 8: physics, rendering, reward, acting and keeping, updates,
+  each beside its floor: the matrix products of updates and encoder alone, at the rate of a large product.
+
+The translator has random weights: its speed is that of a trained one. Run it on an idle machine.
+
+Usage: python benchmarks/lockstep.py
+"""
+
+import os
+import time
+from collections.abc import Callable
+from contextlib import contextmanager
+from itertools import pairwise
+
+import numpy as np
+import torch
+
+from anyview.config import Params, load_params
+from anyview.imitation.evaluation import groups_of
+from anyview.imitation.gym_env import TranslatedReward
+from anyview.imitation.methods import Group, make_learner
+from anyview.imitation.rewards import DemonstrationReward, translate_demonstrations
+from anyview.runtime.workers import run_units
+from anyview.sim.batch import ACTIONS, PusherBatch
+from anyview.sim.contexts import Context, sample_contexts
+from anyview.sim.env import PusherEnv
+from anyview.sim.expert import roll_out
+from anyview.sim.render import renderer
+from anyview.translation.network import ContextTranslator
+
+RUNS, EPISODES, ROUNDS = 15, 4, 3
+
+
+def make_translator(params: Params) -> ContextTranslator:
+    """A compact translator with random weights."""
+    torch.manual_seed(0)
+    return ContextTranslator("compact", params.sim.image_size).eval().requires_grad_(False)
+
+
+def make_clips(params: Params, contexts: list[Context]) -> np.ndarray:
+    """The expert in ``contexts``, (N, 50, H, W, 3)."""
+    camera, (positions, _) = renderer(params.sim.image_size), roll_out(contexts)
+    return np.stack([camera.render_clip(*each) for each in zip(contexts, positions, strict=True)])
+
+
+class Stopwatch:
+    """Seconds by part."""
+
+    def __init__(self) -> None:
+        self.parts: dict[str, float] = {}
+
+    @contextmanager
+    def part(self, name: str):
+        started = time.perf_counter()
+        yield
+        self.parts[name] = self.parts.get(name, 0.0) + time.perf_counter() - started
+
+
+def train_group(params: Params, runs: range, contexts: list[Context]) -> tuple[int, Stopwatch]:
+    """Train ``runs`` in lockstep for EPISODES episodes after one to warm up: steps, and seconds by part."""
+    torch.set_num_threads(1)
+    clips = make_clips(params, contexts)
+    group = Group(params, params.imitation.cells["ours"], runs, contexts, clips[:2], clips)
+    learner, model, first = make_learner(group), make_translator(params), np.ascontiguousarray(clips[:, 0])
+    targets = translate_demonstrations(model, clips[:2], first)
+    reward = DemonstrationReward(model, *targets, first, params.imitation.reward)
+    pushers, watch = PusherBatch(contexts, image_size=params.sim.image_size), Stopwatch()
+    for episode in range(EPISODES + 1):
+        if episode == 1:
+            watch = Stopwatch()
+        observations = pushers.reset()[:, None]
+        for step in range(1, ACTIONS + 1):
+            with watch.part("acting and keeping"):
+                actions = learner.act(observations, explore=True)
+            with watch.part("physics"):
+                following = pushers.step(actions[:, 0])[:, None]
+            with watch.part("rendering"):
+                frames = pushers.render()
+            with watch.part("reward (encoder)"):
+                rewards = reward.step(frames[:, None], step)
+            with watch.part("acting and keeping"):
+                learner.record(observations, actions, rewards, following, step)
+            observations = following
+        with watch.part("updates"):
+            learner.end_iteration()
+    return EPISODES * ACTIONS * len(runs), watch
+
+
+def lockstep_rate(params: Params, contexts: list[Context]) -> float:
+    """Steps per second of 15 runs in groups on two workers, setting up left out."""
+    os.environ["ANYVIEW_WORKERS"] = "2"
+    groups = groups_of(len(contexts))
+    units = [(params, group, [contexts[run] for run in group]) for group in groups]
+    return sum(steps / sum(watch.parts.values()) for steps, watch in run_units(train_group, units))
+
+
+def stable_baselines3_rate(params: Params, contexts: list[Context], threads: int) -> float:
+    """Steps per second of Stable-Baselines3's DDPG in one run: the rate of any number one after another."""
+    from stable_baselines3 import DDPG
+
+    torch.set_num_threads(threads)
+    clips = make_clips(params, contexts[:2])
+    pusher = PusherEnv(contexts[0], image_size=params.sim.image_size, render_mode="rgb_array")
+    env = TranslatedReward(pusher, make_translator(params), clips, params.imitation.reward)
+    wanted = params.imitation.ddpg
+    model = DDPG(
+        "MlpPolicy",
+        env,
+        batch_size=wanted.batch_size,
+        gradient_steps=round(wanted.updates_per_step),
+        train_freq=1,
+        learning_starts=ACTIONS - 1,
+        policy_kwargs={"net_arch": list(wanted.hidden)},
+    )
+    model.learn(ACTIONS)
+    started = time.perf_counter()
+    model.learn(EPISODES * ACTIONS, reset_num_timesteps=False)
+    return EPISODES * ACTIONS / (time.perf_counter() - started)
+
+
+def seconds(work: Callable[[], object], repeats: int = 30) -> float:
+    """Median time of ``work``."""
+    times = []
+    for _ in range(repeats):
+        started = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - started)
+    return float(np.median(times))
+
+
+def floors(params: Params) -> dict[str, float]:
+    """Seconds of a lockstep step of 8 runs that encoder and updates take at a large product's rate."""
+    torch.set_num_threads(1)
+    square = torch.randn(512, 512)
+    rate = 2 * 512**3 / seconds(lambda: square @ square)
+    size, channels = params.sim.image_size, (3, 16, 32, 64, 128)
+    encoder = sum(
+        2 * 25 * before * after * (size >> (layer + 1)) ** 2
+        for layer, (before, after) in enumerate(pairwise(channels))
+    )
+    ddpg = params.imitation.ddpg
+    widths = [18 + ddpg.time_bumps, *ddpg.hidden, 1]
+    network = 2 * ddpg.batch_size * sum(a * b for a, b in pairwise(widths))
+    # Per update, in passes: targets 2, critic 3 (its backward counts 2), policy 3 and through the critic 2.
+    return {
+        "reward (encoder)": 8 * encoder / rate,
+        "updates": ddpg.updates_per_step * 8 * 10 * network / rate,
+    }
+
+
+def main() -> None:
+    """Print the comparison and the breakdown."""
+    params, cores = load_params(), len(os.sched_getaffinity(0))
+    ddpg = params.imitation.ddpg.model_copy(update={"time_bumps": 0, "warmup_episodes": 1})
+    imitation = params.imitation.model_copy(update={"ddpg": ddpg, "episodes_per_iteration": 1})
+    params = params.model_copy(update={"imitation": imitation})
+    contexts, _ = sample_contexts(np.random.default_rng(0), RUNS)
+    pairs = []
+    for _ in range(ROUNDS):
+        theirs = [stable_baselines3_rate(params, contexts, threads) for threads in {1, cores}]
+        pairs.append((lockstep_rate(params, contexts), max(theirs)))
+    ours_rate, theirs_rate = np.median(pairs, axis=0)
+    ratios = [a / b for a, b in pairs]
+    print(
+        f"{RUNS} runs, {ddpg.updates_per_step:.0f} updates a step of batch {ddpg.batch_size}, "
+        f"{ddpg.hidden} units: lockstep {ours_rate:.0f} steps/s,\n"
+        f"Stable-Baselines3 {theirs_rate:.0f} steps/s: ratio {np.median(ratios):.1f} "
+        f"(from {min(ratios):.1f} to {max(ratios):.1f} over {ROUNDS} rounds)\n"
+    )
+    steps, watch = train_group(params, range(8), contexts[:8])
+    lowest, whole = floors(params), sum(watch.parts.values())
+    print("a lockstep step of 8 runs on one core:")
+    for name, spent in sorted(watch.parts.items(), key=lambda part: -part[1]):
+        floor = f", floor {1000 * lowest[name]:.2f} ms" if name in lowest else ""
+        print(f"  {name:20} {1000 * 8 * spent / steps:6.2f} ms {100 * spent / whole:4.0f}%{floor}")
+
+
+if __name__ == "__main__":
+    main()
