@@ -215,7 +215,7 @@ class Discriminator(Block):
 
     batch_size: Count
     learning_rate: Positive
-    steps_per_iteration: Count
+    steps: Count = Field(description="steps of the discriminator after the episodes of each policy step")
     domain_weight: NonNegative = Field(description="gradient reversal of TPIL's domain head")
 
 
