@@ -132,12 +132,14 @@ def test_anatomy_of_a_learned_reward_has_no_return_table():
         (Anatomy(0.9, 50.0, 0.4, 0.9, 0.9, {}), "succeeds"),
         (
             Anatomy(0.0, None, None, None, -0.1, {"accuracy": 0.97}),
-            "accuracy 97%): this reward does not measure",
+            "accuracy 97%): following this reward is not",
         ),
-        (Anatomy(0.1, 50.0, 0.4, 1.1, 0.9, {}), "optimum is not the goal"),
-        (Anatomy(0.1, 50.0, 0.4, 0.95, 0.9, {}), "wins 95%"),
-        (Anatomy(0.1, 50.0, 0.4, 0.5, 0.9, {}), "wins only 50%"),
         (Anatomy(0.1, None, None, None, 0.8, {}), "not near enough"),
+        (Anatomy(0.1, None, None, None, None, {}), "–"),
+        (Anatomy(0.1, 50.0, 0.4, 0.2, 0.0, {}), "wins only 20%"),
+        (Anatomy(0.1, 50.0, 0.4, 0.95, 0.0, {}), "matched without doing the task"),
+        (Anatomy(0.1, 50.0, 0.4, 0.95, 0.9, {}), "wins 95%"),
+        (Anatomy(0.1, 50.0, 0.4, 1.1, 0.9, {}), "optimum is not the goal"),
     ],
 )
 def test_the_reason_follows_from_the_measurements(measured, words):

@@ -159,7 +159,7 @@ def _learning(study: Study) -> Iterator[Exhibit]:
         "learning",
         "Learning curves",
         (
-            "Final distance of the training episodes, exploration included: median and interquartile band "
+            "Final distance of the policy so far, acting without noise: median and interquartile band "
             "over the runs. Dashed grey: ours.",
         ),
         to_svg(figures.learning(curves, OURS, "final_distance", "cm", 100)),

@@ -15,6 +15,8 @@ BLIND = 0.2
 """Rank correlation of return with nearness below which a reward counts as blind to the task."""
 UNSEEN = 0.15
 """Share of the expert's return carried by the object below which a reward hardly sees it."""
+SHORT = 0.9
+"""Share of the expert's return below which the learner, and not the reward, is what stops a method."""
 GOOD = 0.8
 """Success rate from which a method needs no excuse: the thesis's own for its method."""
 
@@ -85,26 +87,34 @@ def why(measured: Anatomy) -> str:
         )
     if measured.success >= GOOD:
         return f"It succeeds: the reward tells progress, and the learner follows it{judged}."
-    if guidance is not None and guidance < BLIND:
-        return (
-            f"Earning more did not bring the object nearer over training{judged}: this reward does not "
-            "measure the task, whatever learns from it."
-        )
+    blind = guidance is not None and guidance < BLIND
     if reached is None:
-        return f"Earning more goes with ending nearer{judged}, but not near enough." if guidance else ABSENT
+        if guidance is None:
+            return ABSENT
+        if blind:
+            return (
+                f"Over training, earning more did not go with ending nearer{judged}: following this reward "
+                "is not doing the task."
+            )
+        return f"Earning more goes with ending nearer{judged}, but not near enough."
+    if reached < SHORT:
+        return (
+            f"The policy wins only {percent(reached)} of what the expert’s motion would earn: the reward has "
+            "more to give, and the learner stops short of it."
+        )
+    if blind:
+        return (
+            f"The policy wins {percent(reached)} of what the expert’s motion earns, but earning more did not "
+            "go with ending nearer: the reward is matched without doing the task."
+        )
     if reached >= 1:
         return (
             "The policy earns more than the expert’s own motion and still misses: the reward’s optimum is "
             "not the goal."
         )
-    if reached >= 0.9:
-        return (
-            f"The policy wins {percent(reached)} of what the expert’s motion earns and still misses: so "
-            "near the goal, the reward hardly tells centimetres apart."
-        )
     return (
-        f"The policy wins only {percent(reached)} of what the expert’s motion would earn: the reward still "
-        "has more to give, and the learner stops short of it."
+        f"The policy wins {percent(reached)} of what the expert’s motion earns and still misses: so near the "
+        "goal, the reward hardly tells centimetres apart."
     )
 
 

@@ -48,6 +48,7 @@ def render(
     environment.filters["svg_uri"] = svg_uri
     environment.filters["sub"] = lambda text: subscripts(html.escape(text), "L<sub>{}</sub>")
     idea = overview.idea_strip(study)
+    stages = read_stages(pipeline, params)
     hashes = tuple((path.as_posix(), dvc_hash(path)) for path in inputs)
     return environment.get_template("page.html").render(
         style=_asset("page.css"),
@@ -57,7 +58,8 @@ def render(
         headlines=list(overview.headlines(translation, imitation)),
         surrogate=study.surrogate and any(study.is_real(cell) for cell in study.translations),
         sections=chapters,
-        dag=draw(read_stages(pipeline, params)),
+        dag=draw(stages),
+        stages=Table(("Stage", "Makes"), tuple((stage.name, stage.about) for stage in stages)),
         params_key=content_key(params)[:12],
         inputs_key=content_key(hashes)[:12],
         inputs=Table(("Input", "DVC hash"), hashes),

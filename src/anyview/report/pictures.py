@@ -51,8 +51,9 @@ def make_film(frames: np.ndarray, alt: str, stride: int = 2) -> Film:
 
 
 def side_by_side(frames: np.ndarray) -> np.ndarray:
-    """Frames (n, H, W, 3) in one row (H, n W, 3)."""
-    return np.concatenate(list(frames), axis=1)
+    """Frames (n, H, W, 3) in one row (H, n (W + 1), 3), each with a white line to its right."""
+    lined = np.pad(frames, ((0, 0), (0, 0), (0, 1), (0, 0)), constant_values=255)
+    return np.concatenate(list(lined), axis=1)
 
 
 def webp(picture: np.ndarray, lossless: bool) -> str:

@@ -58,7 +58,7 @@ def success(bars: Sequence[Bar]) -> Figure:
         axis.spines["left"].set_visible(False)
         axis.set_yticks(places, [_label(bar.cell) for bar in bars])
         axis.set(xlim=(-2.5, 100), xlabel="runs that succeed (%)")
-        _tidy_rows(axis)
+        _tidy_rows(axis, len(bars))
         figure.legend(loc="outside upper right", ncols=3)
         return figure
 
@@ -76,7 +76,7 @@ def differences(bars: Sequence[Bar]) -> Figure:
             axis.plot(100 * size.value, place, marker=marker, color=color, markersize=7)
         axis.set_yticks(range(len(bars)), [_label(bar.cell) for bar in bars])
         axis.set(xlabel="cm farther than ours (mean, 95%)", title="Nearer  ←  ours  →  farther")
-        _tidy_rows(axis)
+        _tidy_rows(axis, len(bars))
         return figure
 
 
@@ -124,7 +124,7 @@ def returns(tables: Mapping[str, pd.DataFrame]) -> Figure:
                 axis.plot(share, place, marker, color=color, markersize=7, label=name if place == 0 else None)
         axis.set_yticks(range(len(tables)), [_label(cell) for cell in tables])
         axis.set(xlabel="return (0: standing still, 1: expert)")
-        _tidy_rows(axis)
+        _tidy_rows(axis, len(tables))
         figure.legend(loc="outside upper right", ncols=2)
         return figure
 
@@ -162,7 +162,7 @@ def _values_and_errors(bars: Sequence[Bar]) -> tuple[np.ndarray, np.ndarray]:
     return values, np.abs(bounds - values)
 
 
-def _tidy_rows(axis) -> None:
-    axis.invert_yaxis()
+def _tidy_rows(axis, count: int) -> None:
+    axis.set_ylim(count - 0.4, -0.6)
     axis.grid(axis="y", visible=False)
     axis.tick_params(axis="y", length=0)
