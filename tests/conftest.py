@@ -32,13 +32,14 @@ def scratch(tmp_path_factory, monkeypatch) -> Path:
 
 def copy_of_the_repository(folder: Path) -> Path:
     """A clone with what is not committed yet: the files that git does not ignore, in a new repository."""
-    listed = subprocess.run(
-        ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
-        cwd=ROOT,
-        check=True,
-        capture_output=True,
-    )
-    for name in listed.stdout.decode().split("\0")[:-1]:
+
+    def listed(*which: str) -> list[str]:
+        command = ["git", "ls-files", "-z", *which, "--exclude-standard"]
+        done = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True)
+        return done.stdout.split("\0")[:-1]
+
+    new = [name for name in listed("--others") if not name.startswith("data/")]  # data is DVC's
+    for name in [*listed("--cached"), *new]:
         if (ROOT / name).is_file():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(ROOT / name, folder / name)

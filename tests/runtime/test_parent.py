@@ -106,3 +106,20 @@ def test_no_orphan_of_a_killed_dvc(folder, number):
     (folder / "stage.py").write_text("print('done')")
     again = subprocess.run([*dvc, "repro"], cwd=folder, capture_output=True, text=True)
     assert again.returncode == 0, again.stderr
+
+
+def test_no_worker_outlives_a_stage_killed_before_they_began(folder):
+    """A worker that is still importing when the stage dies has nobody to hear of it later."""
+    process = subprocess.Popen(
+        [sys.executable, "stage.py", "pids"], cwd=folder, env={**os.environ, "ANYVIEW_WORKERS": "2"}
+    )
+    stage = psutil.Process(process.pid)
+
+    def workers() -> list[psutil.Process]:
+        return [child for child in stage.children() if any("popen_loky" in part for part in child.cmdline())]
+
+    wait(lambda: len(workers()) == 2)
+    started = workers()
+    process.kill()
+    process.wait()
+    wait(lambda: not any(worker.is_running() and not _zombie(worker.pid) for worker in started), 30)

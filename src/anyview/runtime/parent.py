@@ -14,13 +14,15 @@ _GRACE_SECONDS = 20.0
 _SHELLS = {"sh", "bash", "dash", "zsh", "fish", "ksh"}
 
 
-def end_with_parent() -> None:
+def end_with_parent(parent: int | None = None) -> None:
     """End this process when its parent ends: SIGTERM, then, should that not be enough, SIGKILL.
+
+    ``parent`` is the parent's process id, where the caller knows it: the parent may be gone by now.
 
     ``dvc`` starts a stage through a shell, which outlives a killed ``dvc``. So a thread watches the parent
     and, where that is ``dvc``'s shell, ``dvc`` too. On Linux the kernel reports the parent's end at once.
     """
-    parent = os.getppid()
+    parent = os.getppid() if parent is None else parent
     if sys.platform.startswith("linux"):
         ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
         if os.getppid() != parent:  # it ended before we could ask

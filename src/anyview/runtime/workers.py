@@ -9,7 +9,6 @@ import os
 import signal
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -45,9 +44,15 @@ def run_units(function: Callable[..., T], units: Sequence[tuple[Any, ...]]) -> I
 
 def _run_locally(function: Callable[..., T], units: Sequence[tuple[Any, ...]]) -> Iterator[T]:
     with joblib.parallel_config(backend="loky", inner_max_num_threads=1):
-        parallel = joblib.Parallel(min(worker_count(), len(units)), return_as="generator", batch_size=1)
+        parallel = joblib.Parallel(
+            min(worker_count(), len(units)),
+            return_as="generator",
+            batch_size=1,
+            initializer=_begin_worker,
+            initargs=(os.getpid(),),
+        )
     try:
-        yield from parallel(joblib.delayed(_local_unit)(function, unit) for unit in units)
+        yield from parallel(joblib.delayed(function)(*unit) for unit in units)
     except TerminatedWorkerError:
         raise AnyviewError(
             "a worker process was killed, perhaps for want of memory; run the same command again, "
@@ -55,16 +60,10 @@ def _run_locally(function: Callable[..., T], units: Sequence[tuple[Any, ...]]) -
         ) from None
 
 
-def _local_unit(function: Callable[..., T], unit: tuple[Any, ...]) -> T:
-    _settle()
-    return function(*unit)
-
-
-@cache
-def _settle() -> None:
-    """Once in a worker: end with the stage, and leave Ctrl-C to it."""
+def _begin_worker(stage: int) -> None:
+    """In a new worker: end with the process ``stage``, and leave Ctrl-C to it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    end_with_parent()
+    end_with_parent(stage)
 
 
 def _run_on_ray(function: Callable[..., T], units: Sequence[tuple[Any, ...]]) -> Iterator[T]:
