@@ -7,12 +7,13 @@ import mujoco.batch
 import numpy as np
 
 from anyview.sim.contexts import Context
-from anyview.sim.kinematics import joint_velocity, tool_pose
+from anyview.sim.kinematics import joint_velocity, tool_pose, within_workspace
 from anyview.sim.path import ACTIONS, FRAMES
 from anyview.sim.render import renderer
 from anyview.sim.scene import (
     ARENA_CENTRE,
     ARENA_RADIUS,
+    CONTROL_SECONDS,
     JOINT_RANGE,
     MAX_JOINT_SPEED,
     MAX_TORQUE,
@@ -66,7 +67,11 @@ class PusherBatch:
         if self._control == "torque":
             self._ctrl[:] = actions * MAX_TORQUE
         else:
-            speed = joint_velocity(self._qpos[:, :3], actions * MAX_TWIST)
+            twist = actions * MAX_TWIST
+            tool = tool_pose(self._qpos[:, :3])[:, :2]
+            target = within_workspace(tool + CONTROL_SECONDS * twist[:, :2])
+            twist[:, :2] = (target - tool) / CONTROL_SECONDS
+            speed = joint_velocity(self._qpos[:, :3], twist)
             # Slow all joints alike, so that the tool keeps its direction.
             excess = np.abs(speed).max(-1, keepdims=True) / MAX_JOINT_SPEED
             self._ctrl[:] = speed / np.maximum(excess, 1)

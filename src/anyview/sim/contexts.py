@@ -1,7 +1,7 @@
 """Contexts: where the camera, object, goal, arm and distractors are. Accepted by geometry alone.
 
 The geometry asks that the expert's straight push, from behind the object to the goal, and its approach are
-within the arm's reach and clear of the object. The expert itself is never run to choose contexts.
+within the arm's reach and workspace and clear of the object. The expert is never run to choose contexts.
 """
 
 import json
@@ -18,6 +18,7 @@ from anyview.sim.scene import (
     DISTRACTORS,
     GOAL_COLOUR,
     OBJECT_COLOUR,
+    WORKSPACE_RADIUS,
 )
 
 Kind = Literal["diverse", "narrow"]
@@ -104,7 +105,9 @@ def _propose(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarr
     poses = expert_poses(arm_qpos, object_xy, goal_xy)
     joints, reachable = joints_for(poses, elbow[:, None])
     steady = np.abs(np.diff(joints, axis=1)).max((1, 2)) < _JOINT_STEP
-    keep = reachable.all(-1) & steady & (clearance(poses, object_xy) > APPROACH_CLEARANCE)
+    inside = np.linalg.norm(poses[..., :2] - ARENA_CENTRE, axis=-1).max(-1) < WORKSPACE_RADIUS
+    clear = clearance(poses, object_xy) > APPROACH_CLEARANCE
+    keep = reachable.all(-1) & steady & inside & clear
     return object_xy[keep], goal_xy[keep], arm_qpos[keep]
 
 

@@ -5,7 +5,7 @@ A tool pose is (x, y, heading) in metres and radians: the end of the third link 
 
 import numpy as np
 
-from anyview.sim.scene import JOINT_RANGE, LINK
+from anyview.sim.scene import ARENA_CENTRE, JOINT_RANGE, LINK, WORKSPACE_RADIUS
 
 
 def wrap(angle: np.ndarray) -> np.ndarray:
@@ -31,6 +31,17 @@ def jacobian(joints: np.ndarray) -> np.ndarray:
     links = LINK * np.stack([-np.sin(angles), np.cos(angles)], axis=-2)  # (..., 2, link)
     linear = np.cumsum(links[..., ::-1], axis=-1)[..., ::-1]  # joint k moves the links from k outward
     return np.concatenate([linear, np.ones_like(linear[..., :1, :])], axis=-2)
+
+
+def within_workspace(position: np.ndarray) -> np.ndarray:
+    """``position`` (..., 2), or the nearest point (..., 2) of the workspace where it lies outside."""
+    offset = position - ARENA_CENTRE
+    distance = np.linalg.norm(offset, axis=-1, keepdims=True)
+    return np.where(
+        distance > WORKSPACE_RADIUS,
+        ARENA_CENTRE + offset * (WORKSPACE_RADIUS / distance.clip(1e-9)),
+        position,
+    )
 
 
 def joint_velocity(joints: np.ndarray, twist: np.ndarray, damping: float = 0.03) -> np.ndarray:

@@ -14,6 +14,7 @@ import numpy as np
 LINK = 0.4  # metres, each of the three links
 ARENA_CENTRE = np.array([0.62, 0.0])  # metres, seen from the arm's base
 ARENA_RADIUS = 0.5  # metres: objects and goals lie within
+WORKSPACE_RADIUS = 0.62  # metres: a commanded twist never takes the tool further out, or out of view
 OBJECT_RADIUS = 0.1
 GOAL_RADIUS = 0.13
 OBJECT_COLOUR = np.array([0.05, 0.15, 0.9])
@@ -45,7 +46,7 @@ CAMERA_FOVY = 28.0  # degrees
 _LINK_HEIGHT = 0.15
 _CUP_HEIGHT = 0.05
 _TABLE = "0.56 0.56 0.54 1"
-_ARM = "0.82 0.82 0.78 1"
+_ARM = "0.72 0.72 0.69 1"
 _DARK = "0.12 0.12 0.12 1"
 
 
