@@ -9,7 +9,9 @@ To make one, call ``write_clips`` or ``write_shard`` for each file, from paralle
 ``write_set`` with what they returned at the end.
 """
 
+import errno
 import hashlib
+import math
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -21,7 +23,7 @@ import pandas as pd
 import psutil
 
 from anyview.clips.manifests import read_table
-from anyview.clips.video import Codec, read_video, write_video
+from anyview.clips.video import Codec, video_frames, write_video
 from anyview.runtime.device import worker_count
 from anyview.runtime.errors import AnyviewError
 from anyview.runtime.outputs import write_atomically
@@ -78,7 +80,7 @@ def open_frames(folder: Path) -> FrameStore:
     """Open a set of clips, decoded once per machine into the scratch folder.
 
     Every file is checked against its SHA-256 on every call. Raises AnyviewError naming the first file that is
-    missing, cut short or altered. One file's frames are in memory at a time and worker.
+    missing, cut short or altered. Little is in memory: frames go to disk one by one.
     """
     manifest = read_table(folder / "manifest.csv", ["clip"], unique="clip")
     files = _read_files(folder)
@@ -137,49 +139,37 @@ def _map(path: Path) -> np.ndarray | None:
 def _decode(folder: Path, files: list[StoredFile], target: Path) -> None:
     """Decode ``files`` into ``target``, a ``.npy`` of shape (N, T, H, W, 3) that appears when it is whole."""
     _remove_partials_of_the_dead(target)
-    first = _decode_file(folder, files[0])
-    shape = (sum(stored.clips for stored in files), *first.shape[1:])
-    clip_bytes = first[0].nbytes
-    starts = np.cumsum([0, *(stored.clips for stored in files)])
+    picture = next(video_frames(folder / files[0].file)).shape
+    shape = (sum(stored.clips for stored in files), files[0].frames, *picture)
+    starts = np.cumsum([0, *(stored.clips * stored.frames for stored in files)]) * math.prod(picture)
     partial = target.with_name(f"partial-{os.getpid()}")
     try:
         with partial.open("wb") as handle:
             header = {"descr": "|u1", "fortran_order": False, "shape": shape}
             np.lib.format.write_array_header_1_0(handle, header)
-            offset = handle.tell()
-            handle.truncate(offset + shape[0] * clip_bytes)
+            begin = handle.tell()
+            handle.truncate(begin + math.prod(shape))
 
             # Plain writes: pages written through a memory map would count as resident until they are flushed.
-            def decode(index: int) -> None:
-                clips = _decode_file(folder, files[index]) if index else first
-                if clips.shape[1:] != shape[1:]:
-                    raise AnyviewError(
-                        f"{folder / files[index].file}: frames {clips.shape[2:]}, not {shape[2:]}"
-                    )
-                _write_at(handle.fileno(), clips.tobytes(), offset + int(starts[index]) * clip_bytes)
+            def decode(stored: StoredFile, offset: int) -> None:
+                count = 0
+                for frame in video_frames(folder / stored.file):
+                    if frame.shape != picture:
+                        raise AnyviewError(f"{folder / stored.file}: frames {frame.shape}, not {picture}")
+                    place = begin + offset + count * frame.nbytes
+                    if os.pwrite(handle.fileno(), frame.data, place) != frame.nbytes:
+                        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(target))
+                    count += 1
+                if count != stored.clips * stored.frames:
+                    expected = f"{stored.clips} x {stored.frames}"
+                    raise AnyviewError(f"{folder / stored.file}: {count} frames, not {expected}")
 
             with ThreadPoolExecutor(worker_count()) as pool:  # OpenCV decodes outside the interpreter's lock
-                for _ in pool.map(decode, range(len(files))):
+                for _ in pool.map(decode, files, (int(start) for start in starts[:-1])):
                     pass
         os.replace(partial, target)
     finally:
         partial.unlink(missing_ok=True)
-
-
-def _decode_file(folder: Path, stored: StoredFile) -> np.ndarray:
-    frames = read_video(folder / stored.file)
-    if len(frames) != stored.clips * stored.frames:
-        raise AnyviewError(
-            f"{folder / stored.file}: {len(frames)} frames, not {stored.clips} x {stored.frames}"
-        )
-    return frames.reshape(stored.clips, stored.frames, *frames.shape[1:])
-
-
-def _write_at(descriptor: int, content: bytes, offset: int) -> None:
-    view = memoryview(content)
-    while view:
-        written = os.pwrite(descriptor, view, offset)
-        view, offset = view[written:], offset + written
 
 
 def _remove_partials_of_the_dead(target: Path) -> None:

@@ -38,23 +38,28 @@ def open_capture(path: Path) -> Iterator[tuple[cv2.VideoCapture, Messages]]:
             capture.release()
 
 
-def read_video(path: Path) -> np.ndarray:
-    """All frames of a video, uint8 RGB (T, H, W, 3).
+def video_frames(path: Path) -> Iterator[np.ndarray]:
+    """The frames of a video one by one, uint8 RGB (H, W, 3).
 
-    Raises AnyviewError when the file is missing, cannot be opened, or is damaged: it holds another number of
-    frames than its header declares, or FFmpeg finds fault with one.
+    Raises AnyviewError when the file is missing, cannot be opened, or at its end turns out to be damaged: it
+    holds another number of frames than its header declares, or FFmpeg found fault with one.
     """
+    count = 0
     with open_capture(path) as (capture, messages):
         declared = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
-        frames = []
         while (frame := capture.read()[1]) is not None:
-            frames.append(cv2.cvtColor(frame, cv2.COLOR_BGR2RGB))
+            count += 1
+            yield cv2.cvtColor(frame, cv2.COLOR_BGR2RGB)
         damage = messages.damage()
-    if not frames or len(frames) != declared:
-        raise AnyviewError(f"{path}: damaged: {len(frames)} of {declared} frames can be decoded")
+    if not count or count != declared:
+        raise AnyviewError(f"{path}: damaged: {count} of {declared} frames can be decoded")
     if damage:
         raise AnyviewError(f"{path}: damaged: {damage}")
-    return np.stack(frames)
+
+
+def read_video(path: Path) -> np.ndarray:
+    """All frames of a video, uint8 RGB (T, H, W, 3); raises like ``video_frames``."""
+    return np.stack(list(video_frames(path)))
 
 
 class VideoWriter:

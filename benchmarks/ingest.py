@@ -1,0 +1,86 @@
+"""Ingest against a plain OpenCV read-resize-write loop, over the same surrogate clips in one run.
+
+    python benchmarks/ingest.py [--clips 48] [--rounds 3]
+
+Rounds alternate, and the fastest of each counts: what else the machine does can only slow it down.
+"""
+
+import argparse
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+
+from anyview.clips.ingest import Candidate, ingest_clip
+from anyview.clips.surrogate.film import film, plan
+from anyview.config import load_params
+from anyview.runtime.workers import run_units
+
+DEMONSTRATIONS = 4  # filmed once; their clips are listed again until there are enough
+
+
+def plain_loop(paths: list[Path], folder: Path, size: int) -> None:
+    """Read every frame, resize it, write it: no checks, no resampling."""
+    for index, path in enumerate(paths):
+        capture = cv2.VideoCapture(str(path))
+        fourcc = cv2.VideoWriter.fourcc(*"XVID")
+        writer = cv2.VideoWriter(str(folder / f"{index}.avi"), fourcc, 10.0, (size, size))
+        while (frame := capture.read()[1]) is not None:
+            writer.write(cv2.resize(frame, (size, size), interpolation=cv2.INTER_AREA))
+        writer.release()
+        capture.release()
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--clips", type=int, default=48)
+    parser.add_argument("--rounds", type=int, default=3)
+    options = parser.parse_args()
+    params = load_params().real
+
+    with tempfile.TemporaryDirectory() as root:
+        raw = Path(root, "raw")
+        raw.mkdir()
+        rows = [row for shot in plan(DEMONSTRATIONS, 0, 0) for row in film(raw, shot, params.film.width, 0)]
+        files = [rows[index % len(rows)]["file"] for index in range(options.clips)]
+        candidates = [Candidate(f"{i:04d}", file, str(i), "", "standard") for i, file in enumerate(files)]
+
+        def ingest(workers: int) -> Callable[[Path], None]:
+            def run(folder: Path) -> None:
+                os.environ["ANYVIEW_WORKERS"] = str(workers)
+                units = [(raw, folder, candidate, params.ingest) for candidate in candidates]
+                assert all(not verdict.reason for verdict in run_units(ingest_clip, units))
+
+            return run
+
+        contestants: dict[str, Callable[[Path], None]] = {
+            "plain loop": lambda folder: plain_loop(
+                [raw / file for file in files], folder, params.ingest.size
+            ),
+            "ingest, 1 worker": ingest(1),
+            "ingest, 2 workers": ingest(2),
+        }
+        best = dict.fromkeys(contestants, float("inf"))
+        for _ in range(options.rounds):
+            for name, contestant in contestants.items():
+                (folder := Path(root, "out")).mkdir()
+                began = time.perf_counter()
+                contestant(folder)
+                best[name] = min(best[name], time.perf_counter() - began)
+                shutil.rmtree(folder)
+
+    print(
+        f"{options.clips} clips of {params.film.width} x {params.film.width * 9 // 16}, {os.cpu_count()} cores"
+    )
+    for name, seconds in best.items():
+        speed = options.clips / seconds
+        print(f"{name:18} {speed:7.1f} clips/s {best['plain loop'] / seconds:6.2f} x the plain loop")
+    print(f"two workers against one: {best['ingest, 1 worker'] / best['ingest, 2 workers']:.2f} x")
+
+
+if __name__ == "__main__":
+    main()
