@@ -63,7 +63,7 @@ def judge(model: ContextTranslator, dataset: Dataset, source: int, target: int) 
         float(frame_loss(model.decoder(z_true, shares), true)),
         float(alignment_loss(z3, z_true)),
     ]
-    shown, wanted = to_frames(translated), np.asarray(dataset.frames[target])
+    shown, wanted = to_frames(translated), np.array(dataset.frames[target])
     names = dataset.clips["clip"]
     row: dict[str, str | float] = {
         "clip": names.iloc[target],
