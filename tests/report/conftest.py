@@ -110,7 +110,7 @@ class Data:
                 rows.append({"iteration": iteration, "run": run, "final_distance": left, "return": gained})
         curve = pd.DataFrame(rows)
         if blind:
-            curve["discriminator_accuracy"] = 0.97
+            curve["expert_accuracy"], curve["agent_accuracy"] = 0.97, 0.93
         curve.to_csv(folder / "curve.csv", index=False)
         self._csv(folder / "demonstrations.csv", clip=["diverse-0003", "diverse-0007"])
         (folder / "rollouts").mkdir()

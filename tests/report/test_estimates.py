@@ -5,7 +5,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from anyview.imitation.statistics import mcnemar_exact, wilson_interval
@@ -14,6 +14,7 @@ from anyview.report.estimates import Estimator, proportion
 NORMAL_97_5 = 1.959963984540054
 
 
+@settings(deadline=None)
 @given(st.integers(1, 60).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))))
 def test_wilson_bounds_solve_wilsons_equation(counts):
     """At a bound p, the observed rate lies exactly 1.96 standard errors (under p) away from p."""
@@ -29,6 +30,7 @@ def test_the_thesis_success_rates_overlap_widely():
     assert (round(low, 3), round(high, 3)) == (0.548, 0.930)
 
 
+@settings(deadline=None)
 @given(st.lists(st.tuples(st.booleans(), st.booleans()), min_size=1, max_size=9))
 def test_mcnemar_counts_the_outcomes_at_least_as_rare(pairs):
     first, second = np.array(pairs).T

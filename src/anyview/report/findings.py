@@ -28,7 +28,7 @@ class Anatomy:
     ``worth`` is the return of the expert's own motion above that of standing still. Shares of it are
     ``carried``, which needs the object and not the arm alone, and ``reached``, which the policy wins.
     ``guidance`` is the rank correlation over training of a run's return with its nearness to the goal. All
-    are medians over runs. ``accuracies`` are a discriminator's, mean over the last tenth of training.
+    are medians over runs. ``accuracies`` of a discriminator by set of frames, mean over the last tenth.
     """
 
     success: float
@@ -65,9 +65,9 @@ def _guidance(curve: pd.DataFrame) -> float | None:
 def _accuracies(curve: pd.DataFrame) -> dict[str, float]:
     late = curve[curve["iteration"] >= curve["iteration"].quantile(0.9)]
     return {
-        column.replace("_", " "): float(late[column].mean())
+        column.removesuffix("_accuracy"): float(late[column].mean())
         for column in curve.columns
-        if "accuracy" in column and late[column].notna().any()
+        if column.endswith("_accuracy") and late[column].notna().any()
     }
 
 
@@ -75,7 +75,7 @@ def why(measured: Anatomy) -> str:
     """A sentence on why a method does what it does, the first that its measurements support."""
     carried, reached, guidance = measured.carried, measured.reached, measured.guidance
     accuracies = [f"{name} {percent(value)}" for name, value in measured.accuracies.items()]
-    judged = f" (its discriminator: {listed(accuracies)})" if accuracies else ""
+    judged = f" (its discriminator tells right: {listed(accuracies)})" if accuracies else ""
     if measured.worth is not None and measured.worth <= 0:
         return (
             "The expert’s own motion earns no more than standing still: this reward leads away from the task."
