@@ -79,7 +79,7 @@ def kill_at_random(study: Study, command: list[str], seconds: float, rng: random
             os.killpg(process.pid, number)  # as a terminal does
         else:
             process.send_signal(number)
-        process.communicate(timeout=60)
+        process.communicate(timeout=180)
     return process.returncode
 
 
