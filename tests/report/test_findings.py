@@ -54,6 +54,14 @@ def test_only_shared_runs_are_compared():
     assert entry.runs == 10
 
 
+def test_two_runs_carry_no_claim():
+    far = evaluation(CONTEXT + 0.5)
+    cells = {cell: evaluation(CONTEXT) for cell in ("ours", "ours-trpo", "narrow-ddpg")} | {"liu": far}
+    few = {cell: Evaluation(Path(), each.runs.head(2), each.curve, ()) for cell, each in cells.items()}
+    assert all(order(entry) == "open" for entry in compare_with_ours(few, seed=1))
+    assert all("too few" in effect_sentence(effect) for effect in factorial_effects(few, seed=1))
+
+
 def test_mcnemar_sides_are_counted():
     ours = np.where(np.arange(RUNS) < 12, 0.01, 0.1)
     other = np.where(np.arange(RUNS) >= 8, 0.01, 0.1)

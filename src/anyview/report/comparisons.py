@@ -11,6 +11,9 @@ from anyview.report.cells import FACTORIAL, OURS, in_order
 from anyview.report.estimates import Estimate, Estimator
 from anyview.report.inputs import Evaluation
 
+ENOUGH_RUNS = 6
+"""Fewer paired runs carry no claim: not even a sign test of runs that all agree would reach 5%."""
+
 
 @dataclass(frozen=True)
 class Comparison:
@@ -25,8 +28,8 @@ class Comparison:
 
     @property
     def ordered(self) -> bool:
-        """Whether the paired interval excludes zero: only then may an order be claimed."""
-        return self.difference.excludes_zero
+        """Whether an order may be claimed: the paired interval excludes zero, and the runs suffice."""
+        return self.runs >= ENOUGH_RUNS and self.difference.excludes_zero
 
 
 @dataclass(frozen=True)
@@ -34,7 +37,13 @@ class Effect:
     """A contrast of the 2x2 in metres of final distance (below 0: nearer to the goal)."""
 
     name: str
+    runs: int
     size: Estimate
+
+    @property
+    def present(self) -> bool:
+        """Whether an effect may be claimed, by the same rule as an order."""
+        return self.runs >= ENOUGH_RUNS and self.size.excludes_zero
 
 
 def compare_with_ours(evaluations: Mapping[str, Evaluation], seed: int) -> list[Comparison]:
@@ -69,7 +78,7 @@ def factorial_effects(evaluations: Mapping[str, Evaluation], seed: int) -> list[
     }
     estimator = Estimator(seed)
     return [
-        Effect(name, estimator.mean(f"factorial/{name}", values.to_numpy()))
+        Effect(name, len(values), estimator.mean(f"factorial/{name}", values.to_numpy()))
         for name, values in contrasts.items()
     ]
 

@@ -47,7 +47,8 @@ def section(study: Study, metrics: Tree) -> Section:
         "compared in pairs. Success: the object’s centre ends within 2 cm of the goal’s.",
         "With 15 runs, 12 successes against 7 are not significant (exact McNemar p ≥ 0.06): most gaps of "
         "the thesis are not. An order is put into words here only where the 95% interval of the paired "
-        "difference of final distance excludes zero; these intervals are not corrected for their number.",
+        "difference of final distance excludes zero over at least 6 runs; these intervals are not "
+        "corrected for their number.",
     )
     return Section("imitation", "Imitation", text, exhibits)
 
@@ -98,7 +99,7 @@ def _differences(comparisons: list[Comparison]) -> Iterator[Exhibit]:
             "interval. It says more than success, which throws away by how much a run misses.",
             *claims(comparisons),
         ),
-        to_svg(figures.differences([figures.Bar(entry.cell, entry.difference) for entry in comparisons])),
+        to_svg(figures.differences(comparisons)),
         table=Table(headings, rows),
     )
 

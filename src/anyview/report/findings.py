@@ -7,7 +7,7 @@ import pandas as pd
 from scipy import stats
 
 from anyview.report.cells import label
-from anyview.report.comparisons import Comparison, Effect
+from anyview.report.comparisons import ENOUGH_RUNS, Comparison, Effect
 from anyview.report.inputs import Evaluation
 from anyview.report.words import ABSENT, centimetres_spread, listed, percent
 
@@ -153,8 +153,9 @@ def effect_sentence(effect: Effect) -> str:
     """An effect of the 2x2 in words."""
     size = effect.size
     stated = centimetres_spread(size.value, size.low, size.high)
-    if not size.excludes_zero:
-        return f"{effect.name}: {stated}; the interval holds zero, so no effect is claimed."
+    if not effect.present:
+        reason = "the interval holds zero" if effect.runs >= ENOUGH_RUNS else "the runs are too few"
+        return f"{effect.name}: {stated}; {reason}, so no effect is claimed."
     word = "nearer to the goal" if size.value < 0 else "farther from the goal"
     return f"{effect.name}: {stated}; the object ends {word}."
 

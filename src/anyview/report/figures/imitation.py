@@ -8,6 +8,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from anyview.report import cells as names
+from anyview.report.comparisons import Comparison
 from anyview.report.estimates import Estimate
 from anyview.report.figures.style import (
     BLUE,
@@ -63,20 +64,20 @@ def success(bars: Sequence[Bar]) -> Figure:
         return figure
 
 
-def differences(bars: Sequence[Bar]) -> Figure:
-    """Paired differences of final distance against `ours`, in metres; coloured where 0 is excluded."""
-    with canvas(0.34 * len(bars) + 1.0) as (figure, (axis,)):
+def differences(comparisons: Sequence[Comparison]) -> Figure:
+    """Paired differences of final distance against `ours`; coloured where an order may be claimed."""
+    with canvas(0.34 * len(comparisons) + 1.0) as (figure, (axis,)):
         axis.axvline(0, color=QUIET, linewidth=1)
-        for place, bar in enumerate(bars):
-            size = bar.estimate
-            color, marker = (
-                (VERMILLION, ">") if size.low > 0 else (GREEN, "<") if size.high < 0 else (QUIET, "o")
-            )
+        for place, entry in enumerate(comparisons):
+            size = entry.difference
+            color, marker = QUIET, "o"
+            if entry.ordered:
+                color, marker = (VERMILLION, ">") if size.value > 0 else (GREEN, "<")
             axis.plot([100 * size.low, 100 * size.high], [place, place], color=color, linewidth=2.2)
             axis.plot(100 * size.value, place, marker=marker, color=color, markersize=7)
-        axis.set_yticks(range(len(bars)), [_label(bar.cell) for bar in bars])
+        axis.set_yticks(range(len(comparisons)), [_label(entry.cell) for entry in comparisons])
         axis.set(xlabel="cm farther than ours (mean, 95%)", title="Nearer  ←  ours  →  farther")
-        _tidy_rows(axis, len(bars))
+        _tidy_rows(axis, len(comparisons))
         return figure
 
 
