@@ -17,11 +17,17 @@ _NOT_FIT = 1  # exit code: nothing was wrong with the input, but the answer is n
 # The commands of the other packages: where they are, and the line that stands for them in `anyview --help`,
 # so that no command has to wait for the imports of another.
 _ELSEWHERE = {
-    "record": ("anyview.clips.commands", "Film your own clips with one or two webcams."),
-    "clips": ("anyview.clips.commands", "List and check the clips that there are."),
+    "record": ("anyview.clips.commands", "Film one demonstration with one or two webcams at once."),
+    "clips": (
+        "anyview.clips.commands",
+        "List the clips that there are, by kind, split and source, and the refused with the reason.",
+    ),
     "translate": ("anyview.translation.commands", "Translate a clip to another viewpoint."),
-    "watch": ("anyview.imitation.commands", "Watch a trained policy act."),
-    "review": ("anyview.report.commands", "Summarise what changed since a revision, as Markdown."),
+    "watch": ("anyview.imitation.commands", "Watch a trained policy act, seen from its own camera."),
+    "review": (
+        "anyview.report.commands",
+        "Summarise what changed since REV: params, metrics beyond their intervals, strips, stages that reran.",
+    ),
 }
 
 

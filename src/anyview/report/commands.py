@@ -14,7 +14,7 @@ from anyview.report.revisions import Revision, find_revision
 
 def review(
     revision: Annotated[
-        str, typer.Argument(metavar="[REV]", help="Compare against this branch, tag or commit.")
+        str, typer.Argument(metavar="REV", help="Compare against this branch, tag or commit.")
     ] = "HEAD",
     to: Annotated[
         str | None, typer.Option("--to", metavar="REV", help="Compare this revision, not the working tree.")
