@@ -26,7 +26,7 @@ _ELSEWHERE = {
     "watch": ("anyview.imitation.commands", "Watch a trained policy act, seen from its own camera."),
     "review": (
         "anyview.report.commands",
-        "Summarise what changed since REV: params, metrics beyond their intervals, strips, stages that reran.",
+        "Summarise what changed since REV: params, metrics beyond their intervals, strips, stages rerun.",
     ),
 }
 

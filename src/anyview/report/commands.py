@@ -27,7 +27,7 @@ def review(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON for a script.")] = False,
 ) -> None:
-    """Summarise what changed since REV: params, metrics beyond their intervals, strips, stages that reran.
+    """Summarise what changed since REV: params, metrics beyond their intervals, strips, stages rerun.
 
     Prints Markdown, made to be pasted or posted into a pull request.
     """
