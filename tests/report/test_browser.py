@@ -83,5 +83,5 @@ def test_the_page_works(browser, full, report, tmp_path, width):
     assert verdict["pictures"] > 50
     assert verdict["played"]
     assert verdict["travel"] == pytest.approx(25, abs=1)
-    assert verdict["reels"] == [True, False, True]
+    assert verdict["reels"] == [True, False, True, True, True, True]
     assert verdict["overflow"] <= 0
