@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from anyview.clips import surrogate
+from anyview import clips
 from anyview.clips.manifests import times_file
 from anyview.clips.surrogate.film import film, plan
 from anyview.config import load_params
@@ -24,7 +24,7 @@ def main(arguments: list[str]) -> None:
         raise AnyviewError("usage: python stages/film.py")
     params = load_params()
     wanted = params.real.film
-    code = [Path(__file__), *Path(surrogate.__file__).parent.glob("*.py")]
+    code = [Path(__file__), *Path(clips.__file__).parent.rglob("*.py")]
     scratch = scratch_folder("checkpoints", content_key([params.base.seed, wanted.width], code))
     demonstrations = plan(wanted.pairs, wanted.singles, wanted.extreme_pairs)
     units = [(scratch, demonstration, wanted.width, params.base.seed) for demonstration in demonstrations]

@@ -65,10 +65,10 @@ def _film(folder: Path, demonstration: Demonstration, width: int, seed: int) -> 
     rendered = (round(size[0] * _RENDER_SCALE), round(size[1] * _RENDER_SCALE))
     push = sample_push(rng)
     lenses = [Lens(size, *_LENSES[camera]) for camera in demonstration.cameras]
-    views = [_sample_view(rng, kind, side, lens) for side, lens in enumerate(lenses)]
-    count = {"distractor": int(rng.integers(3, 7)), "extreme_distractor": int(rng.integers(14, 20))}.get(
-        kind, 0
-    )
+    arm = float(push.cup[-1, 3]) + np.pi  # where the arm comes from, seen from the target
+    views = [_sample_view(rng, kind, side, lens, arm) for side, lens in enumerate(lenses)]
+    few, many = int(rng.integers(3, 7)), int(rng.integers(14, 20))
+    count = {"distractor": few, "extreme_distractor": many}.get(kind, 0)
     things = place_things(rng, push, count)
     extreme = kind == "extreme_distractor"
     colour = OTHER_TARGET_COLOURS[rng.integers(len(OTHER_TARGET_COLOURS))] if extreme else TARGET_COLOUR
@@ -87,9 +87,14 @@ def _film(folder: Path, demonstration: Demonstration, width: int, seed: int) -> 
     return rows
 
 
-def _sample_view(rng: np.random.Generator, kind: str, side: int, lens: Lens) -> View:
-    """A tripod's place. The operator sits at azimuth -90 degrees; one camera stands on each side."""
-    azimuth = np.radians(rng.uniform(-35, 85) if side else rng.uniform(95, 215))
+def _sample_view(rng: np.random.Generator, kind: str, side: int, lens: Lens, arm: float) -> View:
+    """A tripod's place, one camera on each side of the operator, who sits at azimuth -90 degrees.
+
+    Nobody puts a camera where the arm, at azimuth ``arm`` in the end, would hide the target.
+    """
+    azimuth = arm
+    while np.cos(azimuth - arm) > 0.55:
+        azimuth = np.radians(rng.uniform(-35, 85) if side else rng.uniform(95, 215))
     elevation = np.radians(rng.uniform(36, 54))
     distance = rng.uniform(0.82, 0.98)
     roll = np.radians(rng.normal(0.0, 1.5))
