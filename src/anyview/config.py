@@ -32,7 +32,9 @@ class Sim(Block):
     """The pusher's world, the same for demonstrations and agents."""
 
     image_size: Literal[32, 64, 128] = Field(description="height and width of a frame in pixels")
-    control: Literal["twist", "torque"] = Field(description="the agent's action: end-effector twist or joint torques")
+    control: Literal["twist", "torque"] = Field(
+        description="the agent's action: end-effector twist or joint torques"
+    )
 
 
 class DemonstrationSet(Block):
@@ -55,7 +57,9 @@ class Film(Block):
     pairs: Count = Field(description="pairs of two views of one demonstration")
     singles: int = Field(ge=0, description="demonstrations that one camera saw")
     extreme_pairs: int = Field(ge=0, description="pairs of extreme distractor clips, for validation only")
-    width: int = Field(ge=160, le=1920, multiple_of=32, description="width of a raw frame; the height is 9/16 of it")
+    width: int = Field(
+        ge=160, le=1920, multiple_of=32, description="width of a raw frame; the height is 9/16 of it"
+    )
 
 
 class Ingest(Block):
@@ -145,8 +149,12 @@ class Training(Block):
 
     batch_size: Count
     learning_rate: Positive
-    schedule: Literal["constant", "cosine"] = Field(description="the rate stays, or falls to 0 along a cosine")
-    precision: Literal["bfloat16", "float32"] = Field(description="of the matrix products; weights stay float32")
+    schedule: Literal["constant", "cosine"] = Field(
+        description="the rate stays, or falls to 0 along a cosine"
+    )
+    precision: Literal["bfloat16", "float32"] = Field(
+        description="of the matrix products; weights stay float32"
+    )
     validation_every: Count = Field(description="iterations between validations")
     validation_pairs: Count = Field(description="frame pairs in the fixed validation set")
 
@@ -191,7 +199,9 @@ class DDPG(Block):
     recent_episodes: Count = Field(description="half of each batch comes from this many newest episodes")
     warmup_episodes: int = Field(ge=0, description="episodes of noise alone before updates start")
     n_step: Annotated[int, Field(ge=1, le=49)] = Field(description="rewards summed before bootstrapping")
-    time_bumps: int = Field(ge=0, description="Gaussian bumps over the episode that show the networks the time")
+    time_bumps: int = Field(
+        ge=0, description="Gaussian bumps over the episode that show the networks the time"
+    )
     noise: Positive = Field(description="Ornstein-Uhlenbeck deviation at first, in units of the action range")
     noise_end: Positive = Field(description="the same at the end; it falls geometrically")
     noise_theta: Fraction = Field(description="Ornstein-Uhlenbeck mean reversion per step; 1 is white noise")
@@ -224,7 +234,9 @@ class ImitationCell(Block):
 
     learner: Literal["ddpg", "trpo"]
     reward: Literal["translated", "true", "embedding", "tpil", "gail"]
-    source: str = Field(description="what the reward is made from: a model folder, or the discriminator's module")
+    source: str = Field(
+        description="what the reward is made from: a model folder, or the discriminator's module"
+    )
     feature: bool = Field(description="use the feature reward L_f")
     image: bool = Field(description="use the image reward L_i")
 
@@ -240,7 +252,9 @@ class Imitation(Block):
 
     runs: Count = Field(description="contexts, each with a policy of its own")
     iterations: Count
-    episodes_per_iteration: Count = Field(description="episodes of 49 steps that each run acts in an iteration")
+    episodes_per_iteration: Count = Field(
+        description="episodes of 49 steps that each run acts in an iteration"
+    )
     reward: Reward
     ddpg: DDPG
     trpo: TRPO

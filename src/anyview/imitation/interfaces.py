@@ -1,4 +1,7 @@
-"""What the evaluation asks of a learner and of a reward: R runs in lockstep, C copies of each run's context."""
+"""What the evaluation asks of a learner and of a reward.
+
+R runs act in lockstep, in C copies of each run's context.
+"""
 
 from typing import Protocol
 
@@ -22,7 +25,10 @@ class Learner(Protocol):
         next_observations: np.ndarray,
         step: int,
     ) -> None:
-        """Take the transition of ``step`` (1 to 49; 49 ends the episode): (R, C, O), (R, C, A), (R, C), (R, C, O)."""
+        """Take the transition of ``step`` (1 to 49; 49 ends the episode).
+
+        Shapes (R, C, O), (R, C, A), (R, C) and (R, C, O).
+        """
         ...
 
     def end_iteration(self) -> None:

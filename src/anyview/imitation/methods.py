@@ -10,11 +10,15 @@ from pathlib import Path
 import numpy as np
 
 from anyview.config import ImitationCell, Params
+from anyview.imitation.demonstrations import training_clips
 from anyview.imitation.interfaces import Learner, RewardSource
 from anyview.runtime.device import torch_device
 from anyview.runtime.errors import AnyviewError
+from anyview.runtime.seeds import stream
 from anyview.sim.batch import ACTION_SIZE, ACTIONS, OBSERVATION_SIZE
 from anyview.sim.contexts import Context
+
+_BYSTANDERS = 100  # clips of random motion for TPIL
 
 
 @dataclass(frozen=True)
@@ -94,4 +98,63 @@ def _demonstrated(group: Group) -> Scoring:
     return Scoring(reward, reward.units, reward.targets(), judges=True)
 
 
-_REWARDS: dict[str, Callable[[Group], Scoring]] = {"translated": _demonstrated, "true": _demonstrated}
+def _embedded(group: Group) -> Scoring:
+    """The distance to the demonstrations in a time-contrastive embedding, which nothing translates."""
+    from anyview.imitation.embedding import EmbeddingReward
+    from anyview.translation.embedding import load_embedding
+
+    folder, size = Path(group.cell.source), group.params.sim.image_size
+    model = load_embedding(folder).to(torch_device())
+    if model.image_size != size:
+        raise AnyviewError(
+            f"{folder}: for frames of {model.image_size} pixels, but sim.image_size is {size}; train it again"
+        )
+    reward = EmbeddingReward(model, group.demonstrations, group.own[:, 0], group.params.imitation.reward)
+    return Scoring(reward, reward.units, _first_demonstration(group), judges=True)
+
+
+def _gail(group: Group) -> Scoring:
+    """GAIL against the training split's clips, each in a context of its own."""
+    from anyview.imitation.discriminators import ClipSet
+    from anyview.imitation.gail import gail_reward
+
+    frames, rows, _ = training_clips(group.params)
+    params, runs = group.params.imitation, group.runs
+    experts = [ClipSet(frames, rows)] * len(runs)
+    reward = gail_reward(
+        params.discriminator, group.params.base.seed, runs, experts, params.trpo.batch_episodes
+    )
+    return Scoring(reward, np.ones(len(runs)), _first_demonstration(group), judges=False)
+
+
+def _tpil(group: Group) -> Scoring:
+    """TPIL against the same clips, and random motion in the contexts of some of them."""
+    from anyview.imitation.discriminators import ClipSet
+    from anyview.imitation.tpil import random_motion, tpil_reward
+
+    frames, rows, contexts = training_clips(group.params)
+    params, runs, seed = group.params.imitation, group.runs, group.params.base.seed
+    rng = stream(seed, "bystanders")
+    chosen = rng.permutation(len(contexts))[:_BYSTANDERS]
+    sim = group.params.sim
+    motion = random_motion(
+        [contexts[index] for index in chosen], rng, params.trpo.initial_std, sim.control, sim.image_size
+    )
+    experts = [ClipSet(frames, rows)] * len(runs)
+    bystanders = [ClipSet(motion, np.arange(len(motion)))] * len(runs)
+    reward = tpil_reward(params.discriminator, seed, runs, experts, bystanders, params.trpo.batch_episodes)
+    return Scoring(reward, np.ones(len(runs)), _first_demonstration(group), judges=False)
+
+
+def _first_demonstration(group: Group) -> np.ndarray:
+    """One of the clips that are shown, beside every run (R, 50, H, W, 3)."""
+    return np.repeat(group.demonstrations[:1], len(group.runs), axis=0)
+
+
+_REWARDS: dict[str, Callable[[Group], Scoring]] = {
+    "translated": _demonstrated,
+    "true": _demonstrated,
+    "embedding": _embedded,
+    "gail": _gail,
+    "tpil": _tpil,
+}

@@ -150,6 +150,12 @@ class Trainer:
             self.best = {name: value.cpu().clone() for name, value in self.model.state_dict().items()}
         return loss, time_error(*embedded).item()
 
+    def best_model(self) -> Embedding:
+        """An embedding with the best weights, on the CPU."""
+        model = Embedding(self._dataset.image_size, self._cell.dimensions)
+        model.load_state_dict(self.best)
+        return model
+
     def arrays(self) -> dict[str, np.ndarray]:
         """Model, optimiser and best weights, for a checkpoint."""
         arrays = {f"model/{name}": value.cpu().numpy() for name, value in self.model.state_dict().items()}
@@ -208,17 +214,14 @@ def train_embedding(name: str, cell: EmbeddingCell, training: Training, seed: in
                 state = {"rows": rows, "best_iteration": run.best_iteration, "best_loss": run.best_loss}
                 checkpoints.save(done, run.arrays(), state)
     with whole_folder(output) as folder:
-        write_atomically(folder / _WEIGHTS, save(run.best))
         meta = {
             "cell": name,
             "dataset": cell.dataset,
             "method": cell.method,
-            "image_size": dataset.image_size,
-            "dimensions": cell.dimensions,
             "iterations": cell.iterations,
             "best_iteration": run.best_iteration,
         }
-        write_atomically(folder / _MODEL, json.dumps(meta, indent=2, sort_keys=True) + "\n")
+        save_embedding(folder, run.best_model(), meta)
         table = pd.DataFrame(rows)
         write_atomically(folder / "curve.csv", table.to_csv(index=False, float_format="%.6g"))
     checkpoints.clear()
@@ -230,6 +233,14 @@ def _key(name: str, cell: EmbeddingCell, training: Training, seed: int) -> str:
     files = [Path(__file__), *(Path(str(module.__file__)) for module in code)]
     values = [name, cell.model_dump(), training.model_dump(), seed]
     return content_key(values, [*files, folder / "manifest.csv", folder / "files.csv", split])
+
+
+def save_embedding(folder: Path, model: Embedding, meta: dict[str, Any]) -> None:
+    """Write the weights, and ``model.json``: image size, dimensions and ``meta`` (JSON-serialisable)."""
+    state = {name: value.detach().cpu() for name, value in model.state_dict().items()}
+    write_atomically(folder / _WEIGHTS, save(state))
+    described = {"image_size": model.image_size, "dimensions": model.dimensions, **meta}
+    write_atomically(folder / _MODEL, json.dumps(described, indent=2, sort_keys=True) + "\n")
 
 
 def load_embedding(folder: Path) -> Embedding:
