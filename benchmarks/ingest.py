@@ -73,9 +73,8 @@ def main() -> None:
                 best[name] = min(best[name], time.perf_counter() - began)
                 shutil.rmtree(folder)
 
-    print(
-        f"{options.clips} clips of {params.film.width} x {params.film.width * 9 // 16}, {os.cpu_count()} cores"
-    )
+    size = f"{params.film.width} x {params.film.width * 9 // 16}"
+    print(f"{options.clips} clips of {size}, {os.cpu_count()} cores")
     for name, seconds in best.items():
         speed = options.clips / seconds
         print(f"{name:18} {speed:7.1f} clips/s {best['plain loop'] / seconds:6.2f} x the plain loop")
