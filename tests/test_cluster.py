@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from conftest import Study
-from test_resume import CASES, change, digests
+
+from tests.conftest import Study
+from tests.test_resume import CASES, change, digests
 
 STORE = {"object_store_memory": 100_000_000}
 

@@ -14,13 +14,13 @@ import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from raw_clips import LIMITS, damaged, pictures, write_raw
 
 from anyview.clips.ingest import Candidate, Verdict, ingest_clip, publish, read_candidates, settle
 from anyview.clips.judge import Refused, read_clip
 from anyview.clips.manifests import propose_manifest
 from anyview.clips.video import read_video
 from anyview.runtime.errors import AnyviewError
+from tests.clips.raw_clips import LIMITS, damaged, pictures, write_raw
 
 
 def candidate(file: str, pair: str = "", kind: str = "standard") -> Candidate:

@@ -14,10 +14,10 @@ import cv2
 import numpy as np
 import pandas as pd
 import pytest
-from raw_clips import LIMITS, pictures, write_raw
 
 from anyview.clips.judge import read_clip
 from anyview.clips.video import read_video
+from tests.clips.raw_clips import LIMITS, pictures, write_raw
 
 
 def command(*arguments: str, cwd: Path, **options) -> subprocess.Popen:

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from raw_clips import pictures, write_raw
+
+from tests.clips.raw_clips import pictures, write_raw
 
 CLIPS = 24
 OUTPUTS = {"ingest.py": "data/real/clips", "film.py": "data/real/surrogate"}

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 import torch
-from tracking import ACTION, HORIZON, OBSERVATION, Tracking, mean_distance, practise
 
 from anyview import config
 from anyview.imitation.ddpg import DDPG
 from anyview.imitation.policies import Policy, with_time_bumps
 from anyview.sim.contexts import Context
+from tests.imitation.tracking import ACTION, HORIZON, OBSERVATION, Tracking, mean_distance, practise
 
 PARAMS = config.DDPG(
     hidden=[32, 32],

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 import torch
 from safetensors.numpy import load, save
-from toy import LAST, PARAMS, SIZE, clip_set, expert_motion, random_motion, show, squares
 
 from anyview.imitation.discriminators import LearnedReward
 from anyview.imitation.gail import FrameDiscriminator, gail_reward
+from tests.imitation.toy import LAST, PARAMS, SIZE, clip_set, expert_motion, random_motion, show, squares
 
 
 def make(runs: list[int], episodes: int = 4) -> LearnedReward:

@@ -3,12 +3,12 @@
 import numpy as np
 import torch
 from torch.nn import functional as F
-from toy import LAST, PARAMS, SIZE, clip_set, expert_motion, random_motion, show, squares
 
 from anyview.imitation import tpil
 from anyview.imitation.tpil import PairDiscriminator, ReverseGradient, tpil_reward
 from anyview.sim.batch import PusherBatch
 from anyview.translation.network import to_input
+from tests.imitation.toy import LAST, PARAMS, SIZE, clip_set, expert_motion, random_motion, show, squares
 
 
 def batch_of(network: PairDiscriminator) -> dict:

@@ -4,12 +4,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from discworld import clip_table, disc_clips
 
 from anyview.clips.store import write_clips, write_set
 from anyview.config import LossWeights, Training, TranslatorCell
 from anyview.translation.sampling import Dataset
 from anyview.translation.trainer import Recipe
+from tests.translation.discworld import clip_table, disc_clips
 
 
 @pytest.fixture(scope="session")

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 import torch
-from discworld import clip_table, disc_clips
 
 from anyview.translation.augmentation import Augmentation
 from anyview.translation.network import to_input
 from anyview.translation.sampling import Dataset
+from tests.translation.discworld import clip_table, disc_clips
 
 COUNT = 60
 

@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 import pytest
 import torch
-from discworld import disc_clips
 from ruamel.yaml import YAML
 
 from anyview.clips.video import read_video, write_video
@@ -18,6 +17,7 @@ from anyview.translation.commands import translate
 from anyview.translation.evaluation import translate_clip
 from anyview.translation.network import ContextTranslator
 from anyview.translation.weights import load_translator, save_translator
+from tests.translation.discworld import disc_clips
 
 
 def run(*command: str | Path) -> subprocess.CompletedProcess[str]:

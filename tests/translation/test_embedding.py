@@ -7,7 +7,6 @@ import numpy as np
 import pandas as pd
 import pytest
 import torch
-from discworld import clip_table
 
 from anyview.clips.store import write_clips, write_set
 from anyview.config import EmbeddingCell, Training
@@ -21,6 +20,7 @@ from anyview.translation.embedding import (
     train_embedding,
     triplet_loss,
 )
+from tests.translation.discworld import clip_table
 
 CELL = EmbeddingCell(method="time-contrastive", dataset="sim-diverse", iterations=6, dimensions=8, margin=0.2)
 TRAINING = Training(

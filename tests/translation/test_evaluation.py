@@ -5,7 +5,6 @@ import numpy as np
 import pandas as pd
 import pytest
 import torch
-from discworld import clip_table, disc_clips
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.lib.stride_tricks import sliding_window_view
@@ -17,6 +16,7 @@ from anyview.translation.importance import feature_weights
 from anyview.translation.network import ContextTranslator, to_frames, to_input
 from anyview.translation.sampling import Dataset
 from anyview.translation.similarity import psnr, ssim
+from tests.translation.discworld import clip_table, disc_clips
 
 
 def slow_ssim(x: np.ndarray, y: np.ndarray) -> float:

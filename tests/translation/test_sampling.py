@@ -3,7 +3,6 @@
 import numpy as np
 import pandas as pd
 import pytest
-from discworld import clip_table, disc_clips
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -16,6 +15,7 @@ from anyview.translation.sampling import (
     training_pairs,
     validation_pairs,
 )
+from tests.translation.discworld import clip_table, disc_clips
 
 
 def test_training_pairs_are_two_training_clips_at_one_time(discs):
