@@ -43,7 +43,7 @@ def test_the_object_moves_only_by_the_cup_and_ends_on_the_target(index):
     touching = (push.cup[1:, 2] < 0.015) & (np.abs(aside) < CUP_HALF_WIDTH) & (ahead < CUP_DEPTH)
     assert not moved[~touching].any()
     assert (ahead[touching] >= OBJECT_RADIUS - 1e-9).all()  # never inside the crossbar
-    assert moved.max() / STEP < 0.3  # metres a second: a hand, not a machine
+    assert moved.max() / STEP < 0.5  # metres a second: a hand, not a machine
 
 
 def to_cup(cup: np.ndarray, xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -6,7 +6,6 @@ import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import IO
 
 import cv2
 
@@ -17,6 +16,7 @@ _OPTIONS = (
     "format_whitelist;avi,mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,mpeg,mpegts,flv,asf,ogg"
 )
 _ERROR_LEVEL = "16"  # AV_LOG_ERROR
+_MOST = 1 << 20  # bytes of messages that are looked at
 _DAMAGE = re.compile(
     r"damaged|error|corrupt|invalid|conceal|truncat|missing|illegal|out of range|not reached", re.I
 )
@@ -26,23 +26,21 @@ _HARMLESS = re.compile(r"APP fields|co located POCs|mmco", re.I)
 class Messages:
     """What FFmpeg said since this object was made."""
 
-    def __init__(self, log: IO[bytes]):
+    def __init__(self, log: int):
         self._log = log
-        self._start = log.seek(0, os.SEEK_END)
+        self._start = os.fstat(log).st_size
 
     def damage(self) -> str:
         """The first message that speaks of damaged data, or nothing."""
-        self._log.seek(self._start)
-        for line in self._log.read().decode(errors="replace").splitlines():
+        for line in os.pread(self._log, _MOST, self._start).decode(errors="replace").splitlines():
             if _DAMAGE.search(line) and not _HARMLESS.search(line):
                 return re.sub(r"^(\[[^]]*\] ?)+", "", line).strip()
         return ""
 
 
 _lock = threading.Lock()
-_log: IO[bytes] | None = None
 _users = 0
-_standard_error = -1
+_log = _standard_error = -1  # file descriptors
 
 
 @contextmanager
@@ -56,11 +54,10 @@ def listening() -> Iterator[Messages]:
     _set_environment()
     with _lock:
         if _users == 0:
-            _log = tempfile.TemporaryFile()  # noqa: SIM115 (closed by the last listener)
-            _standard_error = os.dup(2)
-            os.dup2(_log.fileno(), 2)
+            with tempfile.TemporaryFile("a+b") as file:
+                _log, _standard_error = os.dup(file.fileno()), os.dup(2)
+            os.dup2(_log, 2)
         _users += 1
-        assert _log is not None
         messages = Messages(_log)
     try:
         yield messages
@@ -70,7 +67,7 @@ def listening() -> Iterator[Messages]:
             if _users == 0:
                 os.dup2(_standard_error, 2)
                 os.close(_standard_error)
-                _log.close()
+                os.close(_log)
 
 
 def _set_environment() -> None:

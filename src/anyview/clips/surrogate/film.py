@@ -8,7 +8,8 @@ import pandas as pd
 
 from anyview.clips.manifests import times_file
 from anyview.clips.surrogate.push import sample_push
-from anyview.clips.surrogate.scene import OTHER_TARGET_COLOURS, TARGET_COLOUR, Scene, View, place_things
+from anyview.clips.surrogate.scene import OTHER_TARGET_COLOURS, TARGET_COLOUR, Scene, View
+from anyview.clips.surrogate.things import place_things
 from anyview.clips.surrogate.webcam import Lens, Webcam, frame_times
 from anyview.clips.video import VideoWriter
 from anyview.runtime.once import once
@@ -16,7 +17,7 @@ from anyview.runtime.seeds import stream
 
 RATE = 10.0  # that the camera claims in its files; the true times lie in the sidecar
 _DURATION = 8.15
-_RENDER_SCALE = 0.75  # a cheap webcam's picture is softer than its pixels: rendered smaller, then enlarged
+_RENDER_SCALE = 0.6  # a cheap webcam's picture is softer than its pixels: rendered smaller, then enlarged
 # The two webcams, the same on every day of filming.
 _LENSES = {"left": (0.75, -0.13, 0.020), "right": (0.80, -0.17, 0.030)}  # fovy in radians, k1, k2
 _KINDS = ("standard", "distractor", "standard", "extreme_view", "standard", "distractor", "standard")

@@ -2,33 +2,22 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 
-import cv2
 import numpy as np
 
+from anyview.clips.surrogate.mjcf import geom, numbers, rgba
 from anyview.clips.surrogate.push import CUP_DEPTH, CUP_HALF_WIDTH, OBJECT_RADIUS, TARGET_HALF, Push
+from anyview.clips.surrogate.textures import TABLES, materials_xml, texture_files
+from anyview.clips.surrogate.things import THING_COLOURS, Thing, thing_xml
 from anyview.runtime.graphics import load_mujoco
-from anyview.runtime.seeds import stream
 
 mujoco = load_mujoco()
 
 OBJECT_COLOUR = (0.08, 0.20, 0.55)
 TARGET_COLOUR = (0.74, 0.11, 0.10)
 OTHER_TARGET_COLOURS = ((0.95, 0.80, 0.10), (0.15, 0.62, 0.20), (0.95, 0.50, 0.10), (0.55, 0.20, 0.65))
-THING_COLOURS = (
-    (0.20, 0.60, 0.25),
-    (0.95, 0.80, 0.15),
-    (0.93, 0.92, 0.88),
-    (0.15, 0.15, 0.16),
-    (0.45, 0.25, 0.12),
-    (0.55, 0.55, 0.58),
-    (0.92, 0.62, 0.70),
-    (0.35, 0.70, 0.65),
-)
 _SLEEVES = ((0.28, 0.32, 0.36), (0.20, 0.24, 0.20), (0.46, 0.42, 0.38), (0.13, 0.13, 0.16))
 _SKINS = ((0.82, 0.60, 0.48), (0.62, 0.42, 0.31), (0.45, 0.29, 0.20), (0.88, 0.68, 0.57))
-_TABLES = ("beech", "laminate", "oak")
 
 _ROD_TILT = 0.80  # radians that the tool's rod leans back from upright
 _GRIP = 0.25  # metres along the rod from the cup to the hand
@@ -56,50 +45,8 @@ class View:
         x = np.cos(self.roll) * right + np.sin(self.roll) * up
         y = np.cos(self.roll) * up - np.sin(self.roll) * right
         position = np.array(self.target) + self.distance * back
-        place = f'pos="{_numbers(*position)}" xyaxes="{_numbers(*x, *y)}"'
+        place = f'pos="{numbers(*position)}" xyaxes="{numbers(*x, *y)}"'
         return f'<camera name="{name}" {place} fovy="{np.degrees(self.fovy):.4f}"/>'
-
-
-@dataclass(frozen=True)
-class Thing:
-    """Something else on the table."""
-
-    shape: str
-    x: float
-    y: float
-    yaw: float
-    colour: tuple[float, float, float]
-
-
-THING_RADII = {
-    "mug": 0.05,
-    "box": 0.05,
-    "book": 0.10,
-    "ball": 0.03,
-    "tape": 0.04,
-    "bottle": 0.035,
-    "pen": 0.07,
-    "cube": 0.03,
-}
-
-
-def place_things(rng: np.random.Generator, push: Push, count: int) -> list[Thing]:
-    """Put ``count`` things (fewer where there is no room) on the table, out of the way of the push."""
-    swept = np.concatenate([push.cup[::20, :2], push.object_xy[::20]])
-    placed: list[Thing] = []
-    for _ in range(count * 12):
-        shape = str(rng.choice(list(THING_RADII)))
-        x, y = rng.uniform(-0.42, 0.42), rng.uniform(-0.26, 0.34)
-        radius = THING_RADII[shape]
-        clear = np.linalg.norm(swept - (x, y), axis=1).min() > radius + 0.075
-        clear &= float(np.linalg.norm(push.target_xy - (x, y))) > radius + TARGET_HALF * 1.5
-        clear &= all(np.hypot(x - t.x, y - t.y) > radius + THING_RADII[t.shape] for t in placed)
-        if clear:
-            colour = THING_COLOURS[rng.integers(len(THING_COLOURS))]
-            placed.append(Thing(shape, x, y, rng.uniform(0, 2 * np.pi), colour))
-        if len(placed) == count:
-            break
-    return placed
 
 
 class Scene:
@@ -117,7 +64,7 @@ class Scene:
         """``size`` is (width, height) of the pictures; ``rng`` draws the day: table, clothes, light."""
         xml = _scene_xml(push, views, things, target_colour, size, rng)
         self._push = push
-        self._model = mujoco.MjModel.from_xml_string(xml, _textures())
+        self._model = mujoco.MjModel.from_xml_string(xml, texture_files())
         self._data = mujoco.MjData(self._model)
         self._renderer = mujoco.Renderer(self._model, height=size[1], width=size[0])
         for flag in ("mjRND_REFLECTION", "mjRND_SKYBOX", "mjRND_HAZE", "mjRND_FOG"):
@@ -178,87 +125,44 @@ def _elbow(shoulder: np.ndarray, wrist: np.ndarray) -> np.ndarray:
     return shoulder + along * gap / reach + offset * aside / np.linalg.norm(aside)
 
 
-def _numbers(*values: float) -> str:
-    return " ".join(f"{value:.5g}" for value in values)
-
-
-def _geom(kind: str, size: Sequence[float], at: Sequence[float], look: str, **more: str) -> str:
-    extra = "".join(f' {key}="{value}"' for key, value in more.items())
-    return f'<geom type="{kind}" size="{_numbers(*size)}" pos="{_numbers(*at)}" {look}{extra}/>'
-
-
-def _colour(rgb: Sequence[float]) -> str:
-    return f'rgba="{_numbers(*rgb)} 1"'
-
-
-def _thing_xml(thing: Thing) -> str:
-    look = _colour(thing.colour)
-    pale = _colour([0.5 + 0.5 * channel for channel in thing.colour])
-    geoms = {
-        "mug": [
-            _geom("cylinder", (0.037, 0.045), (0, 0, 0.045), look),
-            _geom("cylinder", (0.032, 0.0005), (0, 0, 0.0901), _colour((0.16, 0.09, 0.05))),
-            _geom("capsule", (0.006, 0.02), (0.052, 0, 0.045), look),
-        ],
-        "box": [_geom("box", (0.045, 0.03, 0.02), (0, 0, 0.02), look)],
-        "book": [
-            _geom("box", (0.075, 0.055, 0.010), (0, 0, 0.010), _colour((0.9, 0.88, 0.8))),
-            _geom("box", (0.077, 0.057, 0.001), (0, 0, 0.021), look),
-        ],
-        "ball": [_geom("sphere", (0.028,), (0, 0, 0.028), look)],
-        "tape": [
-            _geom("cylinder", (0.04, 0.012), (0, 0, 0.012), look),
-            _geom("cylinder", (0.022, 0.0005), (0, 0, 0.0245), _colour((0.35, 0.28, 0.2))),
-        ],
-        "bottle": [
-            _geom("cylinder", (0.03, 0.07), (0, 0, 0.07), look),
-            _geom("cylinder", (0.012, 0.02), (0, 0, 0.16), pale),
-        ],
-        "pen": [_geom("capsule", (0.005, 0.065), (0, 0, 0.005), look, euler="90 0 0")],
-        "cube": [_geom("box", (0.024, 0.024, 0.024), (0, 0, 0.024), look)],
-    }[thing.shape]
-    at = _numbers(thing.x, thing.y, 0)
-    return f'<body pos="{at}" euler="0 0 {np.degrees(thing.yaw):.2f}">{"".join(geoms)}</body>'
-
-
 def _tool_xml(skin: str) -> str:
     """The tool in its own frame: the cup's mouth looks along x, the rod leans back to the hand."""
-    dark = _colour((0.10, 0.10, 0.11))
+    dark = rgba((0.10, 0.10, 0.11))
     tip = CUP_DEPTH / 2
-    cup = _geom("box", (0.006, CUP_HALF_WIDTH + 0.010, 0.019), (-0.006, 0, 0.021), dark)
+    cup = geom("box", (0.006, CUP_HALF_WIDTH + 0.010, 0.019), (-0.006, 0, 0.021), dark)
     for side in (-1, 1):
-        cup += _geom("box", (tip, 0.005, 0.019), (tip, side * (CUP_HALF_WIDTH + 0.005), 0.021), dark)
+        cup += geom("box", (tip, 0.005, 0.019), (tip, side * (CUP_HALF_WIDTH + 0.005), 0.021), dark)
     fingers = "".join(
-        _geom("capsule", (0.0095, 0.019), (0.017, 0.004, _GRIP + d), skin, euler="90 0 0")
+        geom("capsule", (0.0095, 0.019), (0.017, 0.004, _GRIP + d), skin, euler="90 0 0")
         for d in (-0.036, -0.016, 0.004, 0.024)
     )
     hand = (
         fingers
-        + _geom("ellipsoid", (0.024, 0.026, 0.046), (-0.012, 0, _GRIP), skin)
-        + _geom("capsule", (0.010, 0.022), (0.006, 0.026, _GRIP - 0.038), skin, euler="20 0 0")
-        + _geom("capsule", (0.024, 0.02), (-0.008, 0, _GRIP + 0.035), skin)
+        + geom("ellipsoid", (0.024, 0.026, 0.046), (-0.012, 0, _GRIP), skin)
+        + geom("capsule", (0.010, 0.022), (0.006, 0.026, _GRIP - 0.038), skin, euler="20 0 0")
+        + geom("capsule", (0.024, 0.02), (-0.008, 0, _GRIP + 0.035), skin)
     )
-    rod = _geom("capsule", (0.008, 0.14), (0, 0, 0.145), 'material="rod"')
+    rod = geom("capsule", (0.008, 0.14), (0, 0, 0.145), 'material="rod"')
     tilt = -np.degrees(_ROD_TILT)
     return f'{cup}<body pos="-0.004 0 0.02" euler="0 {tilt:.2f} 0">{rod}{hand}</body>'
 
 
 def _operator_xml(sleeve: str, skin: str) -> str:
-    hair = _colour((0.12, 0.09, 0.07))
+    hair = rgba((0.12, 0.09, 0.07))
     torso = (
-        _geom("ellipsoid", (0.21, 0.13, 0.36), (0, -0.70, 0.10), sleeve)
-        + _geom("ellipsoid", (0.20, 0.10, 0.08), (0, -0.68, 0.36), sleeve)
-        + _geom("capsule", (0.05, 0.05), (0, -0.67, 0.45), skin)
-        + _geom("ellipsoid", (0.078, 0.095, 0.115), (0, -0.63, 0.60), skin)
-        + _geom("ellipsoid", (0.085, 0.095, 0.095), (0, -0.66, 0.65), hair)
-        + _geom("capsule", (0.055, 0.15), (-0.22, -0.60, 0.20), sleeve, euler="-20 10 0")
-        + _geom("capsule", (0.042, 0.12), (-0.24, -0.44, 0.045), sleeve, euler="75 0 0")
-        + _geom("ellipsoid", (0.04, 0.06, 0.02), (-0.24, -0.30, 0.02), skin)
+        geom("ellipsoid", (0.21, 0.13, 0.36), (0, -0.70, 0.10), sleeve)
+        + geom("ellipsoid", (0.20, 0.10, 0.08), (0, -0.68, 0.36), sleeve)
+        + geom("capsule", (0.05, 0.05), (0, -0.67, 0.45), skin)
+        + geom("ellipsoid", (0.078, 0.095, 0.115), (0, -0.63, 0.60), skin)
+        + geom("ellipsoid", (0.085, 0.095, 0.095), (0, -0.66, 0.65), hair)
+        + geom("capsule", (0.055, 0.15), (-0.22, -0.60, 0.20), sleeve, euler="-20 10 0")
+        + geom("capsule", (0.042, 0.12), (-0.24, -0.44, 0.045), sleeve, euler="75 0 0")
+        + geom("ellipsoid", (0.04, 0.06, 0.02), (-0.24, -0.30, 0.02), skin)
     )
-    forearm = _geom("capsule", (0.027, 0.06), (0, 0, 0.06), skin) + _geom(
+    forearm = geom("capsule", (0.027, 0.06), (0, 0, 0.06), skin) + geom(
         "capsule", (0.040, 0.105), (0, 0, _FOREARM - 0.10), sleeve
     )
-    upper = _geom("capsule", (0.050, _UPPER_ARM / 2), (0, 0, _UPPER_ARM / 2), sleeve)
+    upper = geom("capsule", (0.050, _UPPER_ARM / 2), (0, 0, _UPPER_ARM / 2), sleeve)
     return (
         f'<body name="torso" mocap="true">{torso}</body>'
         f'<body name="forearm" mocap="true">{forearm}</body>'
@@ -268,24 +172,24 @@ def _operator_xml(sleeve: str, skin: str) -> str:
 
 def _room_xml(rng: np.random.Generator, table: str) -> str:
     room = [
-        _geom("box", (0.62, 0.40, 0.014), (0, 0, -0.0145), f'material="{table}"'),
-        _geom("box", (2.6, 2.4, 0.02), (0, 0, -0.76), 'material="carpet"'),
-        _geom("box", (2.6, 0.02, 1.5), (0, 2.0, 0.7), 'material="plaster"'),
-        _geom("box", (2.6, 0.02, 1.5), (0, -2.4, 0.7), 'material="plaster"'),
-        _geom("box", (0.02, 2.4, 1.5), (-2.2, 0, 0.7), 'material="plaster"'),
-        _geom("box", (0.02, 2.4, 1.5), (2.2, 0, 0.7), 'material="plaster"'),
-        _geom("box", (0.55, 0.01, 0.45), (0.6, 1.97, 0.75), 'material="window"'),
-        _geom("box", (0.40, 0.18, 0.55), (-1.4, 1.75, -0.20), _colour((0.72, 0.70, 0.66))),
-        _geom("box", (0.30, 0.30, 0.28), (1.55, 0.9, -0.47), _colour((0.42, 0.40, 0.38))),
-        _geom("box", (0.20, 0.45, 0.30), (-1.7, -0.6, -0.45), _colour((0.30, 0.33, 0.38))),
-        _geom("box", (0.24, 0.04, 0.30), (0.05, -0.98, 0.0), _colour((0.17, 0.17, 0.19))),
+        geom("box", (0.62, 0.40, 0.014), (0, 0, -0.0145), f'material="{table}"'),
+        geom("box", (2.6, 2.4, 0.02), (0, 0, -0.76), 'material="carpet"'),
+        geom("box", (2.6, 0.02, 1.5), (0, 2.0, 0.7), 'material="plaster"'),
+        geom("box", (2.6, 0.02, 1.5), (0, -2.4, 0.7), 'material="plaster"'),
+        geom("box", (0.02, 2.4, 1.5), (-2.2, 0, 0.7), 'material="plaster"'),
+        geom("box", (0.02, 2.4, 1.5), (2.2, 0, 0.7), 'material="plaster"'),
+        geom("box", (0.55, 0.01, 0.45), (0.6, 1.97, 0.75), 'material="window"'),
+        geom("box", (0.40, 0.18, 0.55), (-1.4, 1.75, -0.20), rgba((0.72, 0.70, 0.66))),
+        geom("box", (0.30, 0.30, 0.28), (1.55, 0.9, -0.47), rgba((0.42, 0.40, 0.38))),
+        geom("box", (0.20, 0.45, 0.30), (-1.7, -0.6, -0.45), rgba((0.30, 0.33, 0.38))),
+        geom("box", (0.24, 0.04, 0.30), (0.05, -0.98, 0.0), rgba((0.17, 0.17, 0.19))),
     ]
     for x, y in ((-0.57, -0.35), (0.57, -0.35), (-0.57, 0.35), (0.57, 0.35)):
-        room.append(_geom("box", (0.02, 0.02, 0.36), (x, y, -0.385), _colour((0.25, 0.25, 0.27))))
+        room.append(geom("box", (0.02, 0.02, 0.36), (x, y, -0.385), rgba((0.25, 0.25, 0.27))))
     for index in range(7):  # folders on the cupboard
         at = (-1.68 + 0.085 * index, 1.72, 0.47 + 0.01 * rng.uniform(-1, 1))
         colour = THING_COLOURS[rng.integers(len(THING_COLOURS))]
-        room.append(_geom("box", (0.036, 0.12, 0.12), at, _colour([0.75 * channel for channel in colour])))
+        room.append(geom("box", (0.036, 0.12, 0.12), at, rgba([0.75 * channel for channel in colour])))
     return "".join(room)
 
 
@@ -297,8 +201,8 @@ def _scene_xml(
     size: tuple[int, int],
     rng: np.random.Generator,
 ) -> str:
-    table = str(rng.choice(_TABLES))
-    sleeve, skin = (_colour(choices[rng.integers(4)]) for choices in (_SLEEVES, _SKINS))
+    table = str(rng.choice(TABLES))
+    sleeve, skin = (rgba(choices[rng.integers(4)]) for choices in (_SLEEVES, _SKINS))
     sun = rng.uniform(0.40, 0.50)
     warmth = rng.uniform(0.90, 1.0)
     angle = rng.uniform(0, 2 * np.pi)
@@ -315,79 +219,23 @@ def _scene_xml(
     <map znear="0.3" zfar="6" shadowscale="0.7"/>
     <headlight active="0"/>
   </visual>
-  <asset>
-    {"".join(f'<texture name="{name}" type="2d" file="{name}.png"/>' for name in _TEXTURE_REPEATS)}
-    {"".join(_material(name, repeat) for name, repeat in _TEXTURE_REPEATS.items())}
-  </asset>
+  <asset>{materials_xml()}</asset>
   <worldbody>
-    <light pos="{_numbers(*lamp)}" dir="{_numbers(*aim)}" castshadow="true" cutoff="60" exponent="1"
-      diffuse="{_numbers(sun, sun * warmth, sun * warmth**2)}" ambient="0.30 0.30 0.30"
+    <light pos="{numbers(*lamp)}" dir="{numbers(*aim)}" castshadow="true" cutoff="60" exponent="1"
+      diffuse="{numbers(sun, sun * warmth, sun * warmth**2)}" ambient="0.30 0.30 0.30"
       specular="0.25 0.25 0.25"/>
     <light pos="0.6 1.8 1.2" dir="-0.3 -1 -0.6" castshadow="false" directional="true"
       diffuse="0.34 0.36 0.39" ambient="0.10 0.10 0.11" specular="0 0 0"/>
     {_room_xml(rng, table)}
-    <body pos="{_numbers(*push.target_xy, 0.0005)}" euler="0 0 {yaw:.2f}">
-      {_geom("box", (TARGET_HALF, TARGET_HALF, 0.0006), (0, 0, 0), _colour(target_colour))}
+    <body pos="{numbers(*push.target_xy, 0.0005)}" euler="0 0 {yaw:.2f}">
+      {geom("box", (TARGET_HALF, TARGET_HALF, 0.0006), (0, 0, 0), rgba(target_colour))}
     </body>
     <body name="object" mocap="true">
-      {_geom("cylinder", (OBJECT_RADIUS, 0.030), (0, 0, 0.0305), _colour(OBJECT_COLOUR))}
+      {geom("cylinder", (OBJECT_RADIUS, 0.030), (0, 0, 0.0305), rgba(OBJECT_COLOUR))}
     </body>
     <body name="tool" mocap="true">{_tool_xml(skin)}</body>
     {_operator_xml(sleeve, skin)}
-    {"".join(_thing_xml(thing) for thing in things)}
+    {"".join(thing_xml(thing) for thing in things)}
     {"".join(view.xml(f"view{index}") for index, view in enumerate(views))}
   </worldbody>
 </mujoco>"""
-
-
-_TEXTURE_REPEATS = {"beech": 1, "oak": 1, "laminate": 2, "carpet": 8, "plaster": 3, "rod": 1, "window": 1}
-
-
-def _material(name: str, repeat: int) -> str:
-    shine = 'specular="0.3" shininess="0.4"' if name in _TABLES else 'specular="0.05" shininess="0.1"'
-    glow = ' emission="0.7"' if name == "window" else ""
-    return f'<material name="{name}" texture="{name}" texrepeat="{repeat} {repeat}" {shine}{glow}/>'
-
-
-@cache
-def _textures() -> dict[str, bytes]:
-    """Procedural textures as PNG files, the same on every machine."""
-    rng = stream(0, "textures")
-    pictures = {
-        "beech": _wood(rng, (0.80, 0.67, 0.49), 0.07),
-        "oak": _wood(rng, (0.62, 0.47, 0.31), 0.10),
-        "laminate": _grain(rng, (0.78, 0.78, 0.76), 0.025, 1.0),
-        "carpet": _grain(rng, (0.33, 0.35, 0.38), 0.10, 0.8),
-        "plaster": _grain(rng, (0.76, 0.75, 0.70), 0.02, 3.0),
-        "rod": _wood(rng, (0.72, 0.56, 0.36), 0.05),
-        "window": _window(),
-    }
-    files = {}
-    for name, picture in pictures.items():
-        pixels = (np.clip(picture, 0.0, 1.0) * 255).astype(np.uint8)
-        files[f"{name}.png"] = cv2.imencode(".png", cv2.cvtColor(pixels, cv2.COLOR_RGB2BGR))[1].tobytes()
-    return files
-
-
-def _wood(rng: np.random.Generator, colour: tuple[float, float, float], contrast: float) -> np.ndarray:
-    """Grain: noise drawn out along x, with broad bands."""
-    fine = cv2.GaussianBlur(rng.normal(size=(512, 512)), (0, 0), sigmaX=40, sigmaY=0.8)
-    broad = cv2.GaussianBlur(rng.normal(size=(512, 512)), (0, 0), sigmaX=120, sigmaY=9)
-    pattern = 0.5 * fine / fine.std() + 0.7 * broad / broad.std()
-    return np.array(colour) * (1.0 + contrast * pattern[..., None])
-
-
-def _grain(
-    rng: np.random.Generator, colour: tuple[float, float, float], contrast: float, size: float
-) -> np.ndarray:
-    noise = cv2.GaussianBlur(rng.normal(size=(256, 256)), (0, 0), size)
-    return np.array(colour) * (1.0 + contrast * noise[..., None] / noise.std())
-
-
-def _window() -> np.ndarray:
-    """A bright pane with a cross bar and the sky paler towards the bottom."""
-    rows = np.linspace(0.0, 1.0, 128)[:, None, None]
-    picture = np.array([0.80, 0.88, 0.98]) * (1 - rows) + np.array([0.97, 0.97, 0.95]) * rows
-    picture = np.repeat(picture, 128, axis=1)
-    picture[60:68] = picture[:, 60:68] = 0.55
-    return picture
