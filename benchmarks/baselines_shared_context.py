@@ -1,0 +1,115 @@
+"""Are GAIL and TPIL sound? With expert and agent in one shared context each must beat an untrained policy.
+
+Contexts are of the stream "tuning", never the evaluation's. Each run sees one clip of the expert in the
+agent's own context and view (and TPIL random motion there); reward, learner and params are the pipeline's.
+Measured are the mean distance, over the 49 steps, from the object to where the expert has it, and the final
+distance from object to goal, both with the policies' noise off.
+
+Usage: python benchmarks/baselines_shared_context.py [gail|tpil] [EPISODES]   (default: both, 1000)
+"""
+
+import sys
+
+import numpy as np
+import torch
+
+from anyview.config import Params, load_params
+from anyview.imitation.discriminators import ClipSet, LearnedReward
+from anyview.imitation.gail import gail_reward
+from anyview.imitation.interfaces import Arrays
+from anyview.imitation.statistics import bootstrap_interval
+from anyview.imitation.tpil import random_motion, tpil_reward
+from anyview.imitation.trpo import TRPO
+from anyview.runtime.seeds import stream
+from anyview.sim.batch import ACTION_SIZE, ACTIONS, OBSERVATION_SIZE, PusherBatch
+from anyview.sim.contexts import Context, sample_contexts
+from anyview.sim.expert import roll_out
+from anyview.sim.render import renderer
+
+RUNS, BYSTANDERS, POINTS = 8, 10, 10
+
+
+def make_reward(method: str, params: Params, contexts: list[Context], clips: np.ndarray) -> LearnedReward:
+    """The reward of ``method`` where run r's expert clip is ``clips[r]``, in the run's own context."""
+    seed, imitation, runs = params.base.seed, params.imitation, range(len(contexts))
+    experts = [ClipSet(clips, np.array([run])) for run in runs]
+    if method == "gail":
+        return gail_reward(imitation.discriminator, seed, runs, experts, imitation.trpo.batch_episodes)
+    repeated = [context for context in contexts for _ in range(BYSTANDERS)]
+    rng = stream(seed, "benchmark")
+    motion = random_motion(repeated, rng, imitation.trpo.initial_std, params.sim.control, clips.shape[2])
+    rows = np.arange(len(motion)).reshape(len(contexts), BYSTANDERS)
+    bystanders = [ClipSet(motion, own) for own in rows]
+    return tpil_reward(
+        imitation.discriminator, seed, runs, experts, bystanders, imitation.trpo.batch_episodes
+    )
+
+
+def explore(pushers: PusherBatch, learner: TRPO, reward: LearnedReward, copies: int) -> Arrays:
+    """A batch of ``copies`` episodes in each context; the discriminators' measures."""
+    shape = (pushers.count // copies, copies)
+    observations = pushers.reset().reshape(*shape, -1)
+    for step in range(1, ACTIONS + 1):
+        actions = learner.act(observations, explore=True)
+        following = pushers.step(actions.reshape(pushers.count, -1)).reshape(*shape, -1)
+        frames = pushers.render()
+        rewards = reward.step(frames.reshape(*shape, *frames.shape[1:]), step)
+        learner.record(observations, actions, rewards, following, step)
+        observations = following
+    learner.end_iteration()
+    return reward.end_iteration()
+
+
+def perform(pushers: PusherBatch, learner: TRPO, expert: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean distance (R,) of the object from where ``expert`` (R, 50, 5) has it, and final distance (R,)."""
+    observations, away = pushers.reset(), []
+    for step in range(1, ACTIONS + 1):
+        observations = pushers.step(learner.act(observations[:, None], explore=False)[:, 0])
+        away.append(np.linalg.norm(pushers.positions()[:, 3:] - expert[:, step, 3:], axis=-1))
+    return np.mean(away, axis=0), pushers.distance()
+
+
+def shared_context(method: str, episodes: int) -> None:
+    """Train RUNS runs of ``method`` and print what they do, against the same policies untrained."""
+    params = load_params()
+    copies = params.imitation.trpo.batch_episodes
+    contexts, _ = sample_contexts(stream(params.base.seed, "tuning"), RUNS)
+    expert, _ = roll_out(contexts)
+    camera = renderer(params.sim.image_size)
+    clips = np.stack([camera.render_clip(*each) for each in zip(contexts, expert, strict=True)])
+    reward = make_reward(method, params, contexts, clips)
+    learner = TRPO(
+        params.imitation.trpo, params.base.seed, range(RUNS), OBSERVATION_SIZE, ACTION_SIZE, ACTIONS
+    )
+    control, size = params.sim.control, params.sim.image_size
+    acting = PusherBatch([context for context in contexts for _ in range(copies)], control, size)
+    testing = PusherBatch(contexts, control, size)
+    before = perform(testing, learner, expert)
+    batches = episodes // copies
+    shown = {batches * (point + 1) // POINTS for point in range(POINTS)}
+    print(f"{method}: {RUNS} contexts; metres, medians")
+    print(f"{'episodes':>10}{'from expert':>14}{'final distance':>16}  accuracies")
+    print(f"{0:10}{np.median(before[0]):14.3f}{np.median(before[1]):16.3f}")
+    for batch in range(1, batches + 1):
+        measures = explore(acting, learner, reward, copies)
+        if batch in shown:
+            after = perform(testing, learner, expert)
+            told = ", ".join(f"{name.split('_')[0]} {value.mean():.2f}" for name, value in measures.items())
+            print(
+                f"{batch * copies:10}{np.median(after[0]):14.3f}{np.median(after[1]):16.3f}  {told}",
+                flush=True,
+            )
+    for name, one, other in zip(("distance from the expert's", "final distance"), before, after, strict=True):
+        low, high = bootstrap_interval(one - other, stream(0, "benchmark", 1), np.mean)
+        better = int((other < one).sum())
+        print(
+            f"{name}: {better} of {RUNS} runs better, by {np.mean(one - other):.3f} ({low:.3f} to {high:.3f})"
+        )
+
+
+if __name__ == "__main__":
+    torch.set_num_threads(1)
+    methods = [argument for argument in sys.argv[1:] if not argument.isdigit()] or ["gail", "tpil"]
+    episodes = next((int(argument) for argument in sys.argv[1:] if argument.isdigit()), 1000)
+    for method in methods:
+        shared_context(method, episodes)
