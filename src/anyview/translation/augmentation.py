@@ -15,7 +15,8 @@ from anyview.translation.network import to_input
 from anyview.translation.sampling import Dataset
 
 _KEPT = 0.2  # share of the clips that stay as filmed
-_DISTRACTORS = 5  # pasted at most
+_DISTRACTORS = 8  # pasted at most
+_TINT = 0.6  # share of a colour of its own in each distractor
 _RADIUS = (0.04, 0.12)  # of a distractor, in widths of the frame
 _MOVING = 40  # a pixel whose grey levels span more in a clip belongs to the motion
 _HUE_WIDTH = 4.0  # concentration of the hue that is turned: about 60 degrees of the colour circle
@@ -31,7 +32,7 @@ class Augmentation:
     """Alters batches of a dataset's training clips.
 
     Colours: one hue is turned to another, with another saturation and white balance. Light: brightness and a
-    gradient across the frame. Distractors: round pieces of other clips, where nothing moves in the clip.
+    gradient across the frame. Distractors: tinted pieces of other clips, where nothing moves in the clip.
     Crop: a zoom with a shift and a small turn.
     """
 
@@ -64,6 +65,8 @@ class Augmentation:
             place = rng.integers(size, size=(2, count))
             radii = rng.uniform(*_RADIUS, size=(2, count)) * size * (index < amount)
             pieces = _shift(self._donors[torch.from_numpy(donors)].to(device), source - place)
+            colours = torch.from_numpy(rng.uniform(-1, 1, (count, 3))).to(device, torch.float32)
+            pieces = torch.lerp(pieces, colours[:, :, None, None], _TINT)
             inside = _ellipses(place, radii, size).to(device)
             frames = torch.where(inside & still, pieces, frames)
         return frames
