@@ -189,9 +189,9 @@ class DDPG(Block):
     """Deep deterministic policy gradient."""
 
     hidden: list[Count] = Field(min_length=1, description="widths of policy and critic")
-    policy_learning_rate: Positive
-    critic_learning_rate: Positive
-    discount: Discount
+    policy_learning_rate: Positive = Field(description="Adam's rate for the policy")
+    critic_learning_rate: Positive = Field(description="Adam's rate for the critic")
+    discount: Discount = Field(description="weight of the next step's return")
     batch_size: Count
     updates_per_step: Positive = Field(description="updates for each step that a run acts in its context")
     target_rate: Annotated[float, Field(gt=0, le=1)] = Field(description="Polyak rate of the target networks")
@@ -213,11 +213,11 @@ class TRPO(Block):
     hidden: list[Count] = Field(min_length=1, description="widths of the policy")
     initial_std: Positive = Field(description="of the Gaussian policy, in units of the action range")
     batch_episodes: Count = Field(description="episodes per policy step")
-    discount: Discount
-    gae_lambda: Fraction
+    discount: Discount = Field(description="weight of the next step's return")
+    gae_lambda: Fraction = Field(description="of generalised advantage estimation")
     step: Positive = Field(description="bound on the mean KL divergence")
-    damping: NonNegative
-    conjugate_gradient_steps: Count
+    damping: NonNegative = Field(description="added to the Fisher matrix's diagonal")
+    conjugate_gradient_steps: Count = Field(description="for each policy step")
 
 
 class Discriminator(Block):
