@@ -100,7 +100,7 @@ def shared_context(method: str, episodes: int) -> None:
                 flush=True,
             )
     for name, one, other in zip(("distance from the expert's", "final distance"), before, after, strict=True):
-        low, high = bootstrap_interval(one - other, stream(0, "benchmark", 1), np.mean)
+        low, high = bootstrap_interval(one - other, np.mean, stream(0, "benchmark", 1))
         better = int((other < one).sum())
         print(
             f"{name}: {better} of {RUNS} runs better, by {np.mean(one - other):.3f} ({low:.3f} to {high:.3f})"
