@@ -32,7 +32,7 @@ test: lint .setup-stamp-graphics ## lint, type check and the fast tests
 	python -m pytest
 
 test-slow: .setup-stamp-dev .setup-stamp-graphics ## kills, clusters, browsers, queues: minutes each
-	python -m pytest -m slow
+	python -m pytest -m slow --durations=12
 
 lint: .setup-stamp-dev ## ruff and mypy
 	ruff check .

@@ -15,7 +15,7 @@ from ruamel.yaml import YAML
 from tests.conftest import Study
 
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
-KILLS = 5
+KILLS = 4
 
 # Stage with its cell, output, and params that make the work last some seconds.
 CASES = {
@@ -33,7 +33,7 @@ CASES = {
     "imitate": (
         ["stages/imitate.py", "ours"],
         "data/policies/ours",
-        {"imitation.iterations": 25, "imitation.runs": 9},
+        {"imitation.iterations": 15, "imitation.runs": 9},
     ),
 }
 
@@ -105,11 +105,10 @@ def test_a_killed_stage_continues_to_the_same_bytes(study, case):
     resumed = 0
     for _ in range(KILLS):
         code = kill_at_random(study, command, seconds, rng)
-        if code == 0:  # it was faster than the signal: start over
+        if code == 0 or (study.folder / output).exists():  # done before the signal: start over
             assert digests(study.folder / output) == expected
             shutil.rmtree(study.folder / output)
         else:
-            assert not (study.folder / output).exists()
             resumed += checkpointed(study.scratch)
     assert resumed > 0, "no kill fell into the work: nothing was shown"
     study.run("python", *command)
@@ -145,9 +144,10 @@ def test_a_killed_dvc_repro_continues(study):
     _, output, params = CASES["train"]
     change(study, **params)
     command = ["dvc", "repro", "--single-item", "train@sim"]
+    lock = (study.folder / "dvc.lock").read_text()
     study.run(*command)
     expected = digests(study.folder / output)
-    study.run("git", "checkout", "-q", "dvc.lock")
+    (study.folder / "dvc.lock").write_text(lock)
     shutil.rmtree(study.scratch)
     shutil.rmtree(study.folder / ".dvc" / "cache" / "runs", ignore_errors=True)
     shutil.rmtree(study.folder / output)

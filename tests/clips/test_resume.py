@@ -77,8 +77,6 @@ def contents(folder: Path) -> dict[str, bytes]:
 @pytest.mark.parametrize(
     ("stage", "units", "stop"),
     [
-        ("ingest.py", CLIPS, signal.SIGKILL),
-        ("ingest.py", CLIPS, signal.SIGTERM),
         ("ingest.py", CLIPS, signal.SIGINT),
         ("film.py", 6, signal.SIGKILL),
     ],
