@@ -31,7 +31,7 @@ repro: .setup-stamp .setup-stamp-graphics ## run the whole pipeline; only what c
 test: lint .setup-stamp-graphics ## lint, type check and the fast tests
 	python -m pytest
 
-test-slow: .setup-stamp-dev .setup-stamp-graphics ## kills, clusters, browsers, queues: minutes each
+test-slow: .setup-stamp-dev .setup-stamp-graphics .setup-stamp-browser ## kills, clusters, browsers, queues: minutes each
 	python -m pytest -m slow --durations=12
 
 lint: .setup-stamp-dev ## ruff and mypy
@@ -91,4 +91,12 @@ clean: ## remove environments and caches; data, results and DVC's cache stay
 		else \
 			echo "error: install $(GL_PACKAGES) (Debian's names), then run make again"; exit 2; \
 		fi; }
+	@touch $@
+
+# The report page is tested in a real browser; without one those tests are skipped and say so.
+.setup-stamp-browser: .setup-stamp
+	@command -v chromium >/dev/null || command -v chromium-browser >/dev/null || command -v google-chrome >/dev/null || { \
+		[ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null && apt-get update -qq \
+			&& apt-get install -y -qq --no-install-recommends chromium; \
+	} || echo "note: no Chromium, so the report page is not tested in a browser; install chromium (Debian's name)"
 	@touch $@
