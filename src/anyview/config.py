@@ -194,6 +194,9 @@ class DDPG(Block):
     discount: Discount = Field(description="weight of the next step's return")
     batch_size: Count
     updates_per_step: Positive = Field(description="updates for each step that a run acts in its context")
+    preactivation_penalty: NonNegative = Field(
+        description="weight in the policy's loss of the squared inputs of its tanh; 0 leaves it out"
+    )
     target_rate: Annotated[float, Field(gt=0, le=1)] = Field(description="Polyak rate of the target networks")
     replay: Count = Field(description="transitions kept per run")
     recent_episodes: Count = Field(description="half of each batch comes from this many newest episodes")

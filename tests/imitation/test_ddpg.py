@@ -17,6 +17,7 @@ PARAMS = config.DDPG(
     discount=0.5,
     batch_size=32,
     updates_per_step=1.0,
+    preactivation_penalty=0.1,
     target_rate=0.1,
     replay=20000,
     recent_episodes=5,
@@ -110,7 +111,9 @@ def test_an_update_is_the_textbooks() -> None:
     loss.backward()
     optimiser.step()
     ascent = torch.optim.Adam(policy.parameters(), lr=0.001)
-    (-critic(torch.cat([inputs, torch.tanh(policy(inputs))], -1)).mean()).backward()
+    before_tanh = policy(inputs)
+    value = critic(torch.cat([inputs, torch.tanh(before_tanh)], -1)).mean()
+    (0.1 * before_tanh.square().sum(-1).mean() - value).backward()
     ascent.step()
     before = learner._target_critic.flat.clone()
     learner._update(batch)

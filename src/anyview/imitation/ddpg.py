@@ -8,6 +8,8 @@ under a dense reward:
 
 - time is in the observation and the last step is terminal, so that nothing is bootstrapped beyond it;
 - the networks also see time as a row of overlapping bumps, so that a correction at one step leaves others be;
+- the policy's loss penalises the squares of what enters its tanh (Andrychowicz et al. 2017, appendix A): a
+  saturated action has no gradient, and early, wrong critics drive actions there for good;
 - all updates of an iteration follow its episodes, and half of each batch comes from the newest episodes: the
   critic must be sharp where the policy now goes, not where it once went.
 """
@@ -150,8 +152,10 @@ class DDPG:
             targets = returns + beyond * self._target_critic(torch.cat([following, next_actions], dim=-1))
         values = self._critic(torch.cat([inputs, actions], dim=-1))
         self._critic_adam.descend(((values - targets) ** 2).mean(1).sum(), params.critic_learning_rate)
-        chosen = torch.cat([inputs, torch.tanh(self._policy(inputs))], dim=-1)
-        self._policy_adam.descend(-self._critic(chosen).mean(1).sum(), params.policy_learning_rate)
+        before_tanh = self._policy(inputs)
+        chosen = torch.cat([inputs, torch.tanh(before_tanh)], dim=-1)
+        cost = params.preactivation_penalty * (before_tanh**2).sum(-1, keepdim=True) - self._critic(chosen)
+        self._policy_adam.descend(cost.mean(1).sum(), params.policy_learning_rate)
         self._target_critic.flat.lerp_(self._critic.flat, params.target_rate)
         self._target_policy.flat.lerp_(self._policy.flat, params.target_rate)
 
