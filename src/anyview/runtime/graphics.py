@@ -49,12 +49,19 @@ def find_backend() -> str | None:
     return next((name for name in sorted(BACKENDS, key=lambda name: name != wish) if not probe(name)), None)
 
 
+class NoGraphics:
+    """Stands for ``mujoco.GLContext`` where no backend works: whoever renders is told what to install."""
+
+    def __init__(self, width: int, height: int):
+        raise AnyviewError(MISSING)
+
+
 def load_mujoco() -> ModuleType:
     """Import ``mujoco`` with a headless OpenGL. Must come before any other import of it in the process.
 
     ``ANYVIEW_GL`` keeps the choice for child processes, which then need not look again. Where no backend
-    works, MuJoCo comes without one: physics runs, and ``require_graphics`` says what is missing. Software
-    rendering stays in the calling thread, since workers already keep every core busy.
+    works, physics runs, and rendering raises AnyviewError saying what is missing. Software rendering stays
+    in the calling thread, since workers already keep every core busy.
     """
     if os.environ.get("ANYVIEW_GL") not in (*BACKENDS, "disabled"):
         os.environ["ANYVIEW_GL"] = find_backend() or "disabled"
@@ -62,14 +69,11 @@ def load_mujoco() -> ModuleType:
     os.environ.setdefault("LP_NUM_THREADS", "0")
     import mujoco
 
-    return mujoco
-
-
-def require_graphics() -> None:
-    """Raise AnyviewError where no headless OpenGL works. To be called before the first frame is rendered."""
-    load_mujoco()
     if os.environ["ANYVIEW_GL"] == "disabled":
-        raise AnyviewError(MISSING)
+        from mujoco.rendering.classic import gl_context  # where `mujoco.Renderer` looks
+
+        mujoco.GLContext = gl_context.GLContext = NoGraphics
+    return mujoco
 
 
 if __name__ == "__main__":
