@@ -1,7 +1,9 @@
 import copy
 import random
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
+from string import ascii_lowercase as LETTERS
 from typing import Any
 
 import pytest
@@ -63,6 +65,7 @@ def test_the_committed_params_are_sound():
             "many",
             "simulate.diverse.demos: Input should be a valid integer, got 'many'",
         ),
+        ("simulate.shard", 10**20, "simulate.shard: no machine can do more than ten million"),
         ("simulate.diverse.demos", True, "simulate.diverse.demos: Input should be a valid integer, got True"),
         ("sim.image_size", 65, "sim.image_size: Input should be 32, 64 or 128, got 65"),
         ("imitation.ddpg.discount", 1.0, "imitation.ddpg.discount: Input should be less than 1, got 1.0"),
@@ -116,8 +119,18 @@ def test_any_value_is_taken_or_refused_in_one_line(path, value):
     assert said is None or ".".join(path) in said
 
 
+ALIASES = "a: &a [x, x]\n" + "".join(f"{new}: &{new} [*{old}, *{old}]\n" for old, new in pairwise(LETTERS))
+
+
 @pytest.mark.parametrize(
-    "content", [b"a: [1", b"a: b: c", b"\xff\xfe", b"- 1\n- 2", b"", b"\t", b"a: &x *x", b"1"]
+    "content",
+    [
+        *(b"a: [1", b"a: b: c", b"\xff\xfe", b"- 1\n- 2", b"", b"\t", b"a: &x *x", b"1"),
+        *(b"a: !!python/object/apply:os.abort []", b"a: !!float x", b"a: 2001-99-99", b"a: " + b"9" * 5000),
+        *(b"a: " + b"[" * 400, b"base: {seed: 2, " + b"x" * 100_000 + b": 1}"),
+        f"{ALIASES}base: {{seed: *z}}".encode(),  # two to the power of 26, were it written out
+    ],
+    ids=lambda content: content[:30],
 )
 def test_a_file_that_is_no_params_is_named(tmp_path, content):
     path = tmp_path / "params.yaml"

@@ -1,15 +1,31 @@
 """``params.yaml`` as strict typed models: an unknown or impossible key is refused by its dotted name."""
 
+import reprlib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from anyview.runtime.errors import AnyviewError
 
-Count = Annotated[int, Field(ge=1)]
+
+def _feasible(count: int) -> int:
+    if count > 10_000_000:
+        raise ValueError("no machine can do more than ten million of these")
+    return count
+
+
+Count = Annotated[int, Field(ge=1), AfterValidator(_feasible)]
 NonNegative = Annotated[float, Field(ge=0)]
 Positive = Annotated[float, Field(gt=0)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
@@ -283,8 +299,10 @@ def read_yaml(path: Path) -> Any:
         return YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise AnyviewError(f"{path}: no such file; run from the root of the repository") from None
-    except (YAMLError, UnicodeDecodeError) as error:
+    except (YAMLError, ValueError) as error:  # ValueErrors: bytes that are no text, the 99th of May
         raise AnyviewError(f"{path}: not valid YAML: {' '.join(str(error).split())}") from None
+    except RecursionError:
+        raise AnyviewError(f"{path}: not valid YAML: nested too deeply") from None
 
 
 def parse_params(values: Any, name: str = "params.yaml") -> Params:
@@ -313,6 +331,13 @@ def _explain(error: ValidationError) -> str:
         if first["type"].startswith("union_tag"):
             key += ".method"
             message = f"Input should be {' or '.join(repr(tag) for tag in sorted(tags))}"
-        if not isinstance(first["input"], dict):
-            message += f", got {first['input']!r}"
+        if not isinstance(first["input"], dict | list | set):  # aliases can make these endless
+            message += f", got {_brief(first['input'])}"
     return f"{key}: {message}" + (f" (and {len(others)} more)" if others else "")
+
+
+def _brief(value: Any) -> str:
+    try:
+        return reprlib.repr(value)
+    except ValueError:  # Python refuses to write out numbers of thousands of digits
+        return "a giant number"

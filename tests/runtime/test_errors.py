@@ -27,6 +27,12 @@ def raising(error: BaseException):
             "error: x.csv: No such file or directory\n",
         ),
         (KeyboardInterrupt(), 130, "interrupted\n"),
+        (AnyviewError("x" * 1_000_000), 2, f"error: {'x' * 2000}\n"),
+        (
+            MemoryError(),
+            2,
+            "error: not enough memory; ask for less in params.yaml, or set fewer ANYVIEW_WORKERS\n",
+        ),
     ],
 )
 def test_a_user_error_is_one_line_and_a_code(capsys, error, code, said):

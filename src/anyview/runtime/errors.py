@@ -12,6 +12,7 @@ from anyview.runtime.parent import end_with_parent
 
 BAD_INPUT = 2
 INTERRUPTED = 130
+_LONGEST = 2000  # characters of a message, should the input that it quotes be longer
 
 
 class AnyviewError(Exception):
@@ -38,7 +39,13 @@ def exit_code(action: Callable[[], object], interrupted: str = "interrupted") ->
         action()
         sys.stdout.flush()
     except AnyviewError as error:
-        print(f"error: {' '.join(str(error).split())}", file=sys.stderr)
+        print(f"error: {' '.join(str(error).split())[:_LONGEST]}", file=sys.stderr)
+        return BAD_INPUT
+    except MemoryError:
+        print(
+            "error: not enough memory; ask for less in params.yaml, or set fewer ANYVIEW_WORKERS",
+            file=sys.stderr,
+        )
         return BAD_INPUT
     except BrokenPipeError:  # the reader of a pipe, such as `head`, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
