@@ -7,6 +7,7 @@ from pathlib import Path
 
 from anyview.config import load_params, read_yaml
 from anyview.report.inputs import read_study
+from anyview.report.markdown import digest
 from anyview.report.metrics import data_metrics, imitation_metrics, translation_metrics, write_metrics
 from anyview.report.page import render, sections, write_figures
 from anyview.report.plots import write_plots
@@ -27,6 +28,7 @@ def main(arguments: list[str]) -> None:
     with whole_folder(DATA / "report") as folder:
         write_figures(folder / "figures", chapters)
         (folder / "index.html").write_text(page, encoding="utf-8")
+        (folder / "report.md").write_text(digest(chapters), encoding="utf-8")
     with whole_folder(Path("metrics/plots")) as folder:
         write_plots(folder, study)
     for name, metrics in (("data", data), ("translation", translation), ("imitation", imitation)):

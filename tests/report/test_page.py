@@ -90,6 +90,19 @@ def test_the_page_says_what_it_was_made_from(page, whole):
     assert "learning_rate: 0.001" in page.text
 
 
+def test_the_numbers_come_as_markdown_too(whole):
+    """Every row of a table has as many cells as its headings, and the claims are those of the page."""
+    text = (whole / "data/report/report.md").read_text(encoding="utf-8")
+    tables = [block.splitlines() for block in text.split("\n\n") if block.startswith("|")]
+    assert len(tables) > 8
+    for rows in tables:
+        assert {row.count(" | ") for row in rows} == {rows[0].count(" | ")}
+    thesis, here = next(row for row in text.splitlines() if row.startswith("| GAIL")).split(" | ")[1:3]
+    assert thesis.startswith("0%")
+    assert here.startswith(("0%", "6.7%"))
+    assert "Farther from the goal than ours" in text
+
+
 def test_figures_are_files_of_their_own_too(whole):
     for path in (whole / "data/report/figures").iterdir():
         ElementTree.parse(path)
