@@ -9,7 +9,7 @@ import pytest
 
 from anyview import cli
 
-COMMANDS = ["doctor", "profile", "record", "clips", "translate", "watch", "review", "clean"]
+COMMANDS = ["doctor", "profile", "record", "clips", "translate", "watch", "review", "sweep", "clean"]
 
 
 @pytest.fixture
@@ -42,6 +42,23 @@ def test_each_command_has_help(here, command):
     done = anyview(here, command, "--help")
     assert done.returncode == 0, done.stderr
     assert f"Usage: anyview {command}" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        ("anyview rev", {"review"}),
+        ("anyview review --", {"--to", "--images", "--json", "--help"}),
+        ("anyview profile s", {"smoke", "study"}),
+    ],
+)
+def test_the_shell_completes(here, typed, offered):
+    """As bash asks: commands, the options of commands whose modules are imported late, names of profiles."""
+    last = str(len(typed.split()) - 1)
+    asked = {"_ANYVIEW_COMPLETE": "complete_bash", "COMP_WORDS": typed, "COMP_CWORD": last}
+    script = Path(sys.executable).parent / "anyview"
+    done = subprocess.run([script], cwd=here, capture_output=True, text=True, env={**os.environ, **asked})
+    assert set(done.stdout.split()) == offered
 
 
 def test_no_command_waits_for_the_imports_of_another(here):

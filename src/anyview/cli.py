@@ -4,6 +4,7 @@ import json
 from collections.abc import Callable
 from dataclasses import asdict
 from importlib import import_module
+from importlib.metadata import version
 from typing import Annotated, Any, NoReturn
 
 import typer
@@ -27,6 +28,10 @@ _ELSEWHERE = {
     "review": (
         "anyview.report.commands",
         "Summarise what changed since REV: params, metrics beyond their intervals, strips, stages rerun.",
+    ),
+    "sweep": (
+        "anyview.report.commands",
+        "Draw what a sweep of KEY by `dvc exp` did to the metrics, as one picture and one table.",
     ),
 }
 
@@ -60,8 +65,18 @@ app = typer.Typer(
 )
 
 
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        print(f"anyview {version('anyview')}")
+        raise typer.Exit
+
+
 @app.callback()
-def _anyview() -> None:
+def _anyview(
+    _version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
     """Imitation of a task from a video filmed from any viewpoint.
 
     Run from the root of the repository. `dvc repro` runs the pipeline; these commands help around it.
@@ -90,9 +105,21 @@ def doctor(as_json: Annotated[bool, typer.Option("--json", help="Print JSON for 
         raise typer.Exit(_NOT_FIT)
 
 
+def _names_of_profiles() -> list[str]:
+    """For the shell's completion."""
+    from anyview.profiles import profile_names
+
+    return profile_names()
+
+
 @app.command()
 def profile(
-    name: Annotated[str | None, typer.Argument(metavar="NAME", help="smoke, default, study, thesis.")] = None,
+    name: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="NAME", help="smoke, default, study, thesis.", autocompletion=_names_of_profiles
+        ),
+    ] = None,
     check: Annotated[
         bool, typer.Option("--check", help="Change nothing; exit 1 unless NAME, or any, is active.")
     ] = False,

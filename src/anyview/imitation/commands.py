@@ -1,5 +1,6 @@
 """The command `anyview watch`."""
 
+import json
 from pathlib import Path
 from typing import Annotated
 
@@ -17,6 +18,7 @@ def watch(
         "watch.mp4"
     ),
     size: Annotated[int, typer.Option("--size", min=64, max=1024, help="Width and height in pixels.")] = 512,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for a script.")] = False,
 ) -> None:
     """Watch a trained policy act, seen from its own camera."""
     import numpy as np
@@ -39,5 +41,9 @@ def watch(
         frames.append(pusher.render()[0])
     write_video(output, np.stack(frames), 10.0, CODECS[output.suffix])
     distance = float(pusher.distance()[0])
-    verdict = "success" if distance < TOLERANCE else "no success"
+    success = distance < TOLERANCE
+    if as_json:
+        print(json.dumps({"output": str(output), "final_distance": distance, "success": success}))
+        return
+    verdict = "success" if success else "no success"
     print(f"{output}: {cell} run {run} leaves the object {100 * distance:.1f} cm from the goal: {verdict}")

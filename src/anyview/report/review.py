@@ -32,6 +32,10 @@ class Reading:
     low: float | None = None
     high: float | None = None
 
+    def __str__(self) -> str:
+        interval = "" if self.low is None else f" [{self.low:g}, {self.high:g}]"
+        return f"{self.value:g}{interval}"
+
 
 @dataclass(frozen=True)
 class MetricChange:
@@ -105,16 +109,27 @@ def _yaml(revision: Revision, path: str) -> dict[str, Any]:
     return values
 
 
-def _flat(values: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+def flat(values: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """(dotted key, value) of every leaf of a tree."""
     for key, value in values.items():
         if isinstance(value, dict):
-            yield from _flat(value, f"{prefix}{key}.")
+            yield from flat(value, f"{prefix}{key}.")
         else:
             yield f"{prefix}{key}", value
 
 
+def with_bounds(group: str, numbers: dict[str, float]) -> dict[str, Reading]:
+    """Metrics as ``group.key``: ``m``, ``m_low`` and ``m_high`` make one reading."""
+    readings = {}
+    for key, value in numbers.items():
+        if key.removesuffix("_low").removesuffix("_high") in numbers and key.endswith(("_low", "_high")):
+            continue
+        readings[f"{group}.{key}"] = Reading(value, numbers.get(f"{key}_low"), numbers.get(f"{key}_high"))
+    return readings
+
+
 def _param_changes(before: dict[str, Any], after: dict[str, Any]) -> Iterator[ParamChange]:
-    old, new = dict(_flat(before)), dict(_flat(after))
+    old, new = dict(flat(before)), dict(flat(after))
     for key in dict.fromkeys([*old, *new]):
         if old.get(key) != new.get(key):
             yield ParamChange(key, old.get(key), new.get(key))
@@ -127,15 +142,10 @@ def _readings(revision: Revision) -> dict[str, Reading]:
         if content is None:
             continue
         try:
-            flat = dict(_flat(json.loads(content)))
-            numbers = {key: value + 0 for key, value in flat.items()}
+            numbers = {key: value + 0 for key, value in flat(json.loads(content))}
         except (ValueError, TypeError, AttributeError) as error:
             raise AnyviewError(f"{path} ({revision.name}): not a tree of numbers: {error}") from None
-        group = path.removeprefix("metrics/").removesuffix(".json")
-        for key, value in numbers.items():
-            if key.removesuffix("_low").removesuffix("_high") in numbers and key.endswith(("_low", "_high")):
-                continue
-            readings[f"{group}.{key}"] = Reading(value, numbers.get(f"{key}_low"), numbers.get(f"{key}_high"))
+        readings |= with_bounds(path.removeprefix("metrics/").removesuffix(".json"), numbers)
     return readings
 
 

@@ -86,10 +86,7 @@ def _code(value: Any) -> str:
 
 
 def _reading(reading: Reading | None) -> str:
-    if reading is None:
-        return _ABSENT
-    interval = "" if reading.low is None else f" [{reading.low:g}, {reading.high:g}]"
-    return f"{reading.value:g}{interval}"
+    return _ABSENT if reading is None else str(reading)
 
 
 def _difference(change: MetricChange) -> str:
