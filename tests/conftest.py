@@ -5,11 +5,15 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import pytest
 
 from anyview.runtime.graphics import load_mujoco
+from tests.long_stages import LONG_STAGES, change, digests
 
 ROOT = Path(__file__).parents[1]
 
@@ -93,13 +97,48 @@ class Study:
         assert process.returncode == 0, f"{' '.join(command)}\n{said[-4000:]}\n{complaint[-4000:]}"
         return said
 
+    def copy(self, folder: Path) -> "Study":
+        """The same study in the new ``folder``, with an empty scratch folder."""
+        shutil.copytree(self.folder, folder / "study", ignore=shutil.ignore_patterns(".venv", "tmp"))
+        return Study(folder / "study", folder / "scratch")
+
 
 @pytest.fixture(scope="session")
-def smoke(tmp_path_factory) -> Study:
-    """The whole pipeline at the `smoke` profile, run once for all tests by the real `dvc repro`."""
+def trunk(tmp_path_factory) -> Study:
+    """The `smoke` profile as far as the clips and the first policy: what single stages need to run."""
     study = Study(
         copy_of_the_repository(tmp_path_factory.mktemp("study")), tmp_path_factory.mktemp("scratch")
     )
     study.run("anyview", "profile", "smoke")
+    study.run("dvc", "repro", "ingest", "imitate@ours")
+    return study
+
+
+@pytest.fixture(scope="session")
+def smoke(trunk, tmp_path_factory) -> Study:
+    """The whole pipeline at the `smoke` profile, run once for all tests by the real `dvc repro`."""
+    study = trunk.copy(tmp_path_factory.mktemp("smoke"))
     study.run("dvc", "repro")
     return study
+
+
+@pytest.fixture
+def study(trunk, tmp_path) -> Study:
+    """A copy of the trunk to change and to run stages in."""
+    return trunk.copy(tmp_path)
+
+
+@pytest.fixture(scope="session")
+def undisturbed(trunk, tmp_path_factory) -> Callable[[str], tuple[dict[str, str], float]]:
+    """What a long stage makes by one worker that nobody stops, and how many seconds it takes."""
+
+    @cache
+    def run(name: str) -> tuple[dict[str, str], float]:
+        stage = LONG_STAGES[name]
+        study = trunk.copy(tmp_path_factory.mktemp(name))
+        change(study.folder, stage.params)
+        began = time.monotonic()
+        study.run("python", *stage.command, ANYVIEW_WORKERS="1")
+        return digests(study.folder / stage.output), time.monotonic() - began
+
+    return run

@@ -1,19 +1,19 @@
 """Beyond one machine: a Ray cluster that loses one of its two nodes, and storage shared by DVC remotes."""
 
-import shutil
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from urllib.request import Request, urlopen
 
 import pytest
 
 from tests.conftest import Study
-from tests.test_resume import CASES, change, digests
+from tests.long_stages import LONG_STAGES, change, digests
 
 STORE = {"object_store_memory": 100_000_000}
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def cluster() -> Iterator:
     """Two nodes with one core each; the address is the first one's."""
     utils = pytest.importorskip("ray.cluster_utils")
@@ -24,50 +24,32 @@ def cluster() -> Iterator:
     cluster.shutdown()
 
 
-@pytest.fixture
-def study(smoke, tmp_path) -> Study:
-    """A copy of the smoke study, with an empty scratch folder."""
-    folder = tmp_path / "study"
-    shutil.copytree(smoke.folder, folder, ignore=shutil.ignore_patterns(".venv", "tmp"))
-    return Study(folder, tmp_path / "scratch")
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["ingest", "imitate"])
+def test_a_cluster_makes_the_same_bytes(study, cluster, undisturbed, name):
+    stage = LONG_STAGES[name]
+    change(study.folder, stage.params)
+    study.run("python", *stage.command, ANYVIEW_BACKEND="ray", RAY_ADDRESS=cluster.address)
+    assert digests(study.folder / stage.output) == undisturbed(name)[0]
 
 
 @pytest.mark.slow
-def test_work_of_a_node_that_dies_is_done_by_the_other(study, cluster):
-    command, output, params = CASES["simulate"]
-    change(study, **params)
-    study.run("python", *command)
-    expected = digests(study.folder / output)
-    shutil.rmtree(study.folder / output)
-    shutil.rmtree(study.scratch)
-
-    process = study.start("python", *command, ANYVIEW_BACKEND="ray", RAY_ADDRESS=cluster.address)
+def test_work_of_a_node_that_dies_is_done_by_the_other(study, cluster, undisturbed):
+    stage = LONG_STAGES["simulate"]
+    change(study.folder, stage.params)
+    process = study.start("python", *stage.command, ANYVIEW_BACKEND="ray", RAY_ADDRESS=cluster.address)
     while len(list(study.scratch.rglob("shard-*.json"))) < 4:
         assert process.poll() is None, process.communicate()
         time.sleep(0.05)
     cluster.remove_node(cluster.second, allow_graceful=False)
     said, complaint = process.communicate()
     assert process.returncode == 0, said + complaint
-    assert digests(study.folder / output) == expected
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("case", ["ingest", "imitate"])
-def test_a_cluster_makes_the_same_bytes(study, cluster, case):
-    command, output, params = CASES[case]
-    change(study, **params)
-    found = []
-    for environment in ({}, {"ANYVIEW_BACKEND": "ray", "RAY_ADDRESS": cluster.address}):
-        study.run("python", *command, **environment)
-        found.append(digests(study.folder / output))
-        shutil.rmtree(study.folder / output)
-        shutil.rmtree(study.scratch)
-    assert found[0] == found[1]
+    assert digests(study.folder / stage.output) == undisturbed("simulate")[0]
 
 
 @pytest.mark.slow
 def test_a_cluster_that_is_not_there_is_told(study):
-    command, _, _ = CASES["simulate"]
+    command = LONG_STAGES["simulate"].command
     process = study.start("python", *command, ANYVIEW_BACKEND="ray", RAY_ADDRESS="127.0.0.1:1")
     _, complaint = process.communicate()
     assert process.returncode == 2
@@ -83,8 +65,9 @@ def clone(study: Study, folder: Path) -> Study:
     return Study(folder, folder.with_name("other-scratch"))
 
 
-def test_results_travel_through_a_shared_folder(study, tmp_path):
+def test_results_travel_through_a_shared_folder(smoke, tmp_path):
     """``dvc push`` here, ``dvc pull`` there: the same bytes, and nothing to run again."""
+    study = smoke.copy(tmp_path)
     study.run("dvc", "remote", "add", "--default", "shared", str(tmp_path / "remote"))
     study.run("dvc", "push")
     other = clone(study, tmp_path / "clone")
@@ -93,8 +76,9 @@ def test_results_travel_through_a_shared_folder(study, tmp_path):
     assert "up to date" in other.run("dvc", "repro")
 
 
-def test_another_clone_can_use_the_run_cache(study, tmp_path):
+def test_another_clone_can_use_the_run_cache(smoke, tmp_path):
     """Without the lock file: ``dvc repro`` recognises what somebody else has run, and fetches it."""
+    study = smoke.copy(tmp_path)
     study.run("dvc", "remote", "add", "--default", "shared", str(tmp_path / "remote"))
     study.run("dvc", "push", "--run-cache")
     other = clone(study, tmp_path / "clone")
@@ -102,3 +86,30 @@ def test_another_clone_can_use_the_run_cache(study, tmp_path):
     other.run("dvc", "pull", "--run-cache", "--allow-missing")
     said = other.run("dvc", "repro", "--pull", "simulate@narrow")
     assert "Stage 'simulate@narrow' is cached" in said
+
+
+@pytest.fixture
+def bucket(monkeypatch) -> Iterator[tuple[str, str]]:
+    """A bucket of an S3-compatible server on this machine: (its URL, the server's address)."""
+    server = pytest.importorskip("moto.server").ThreadedMotoServer("127.0.0.1", port=0, verbose=False)
+    for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
+        monkeypatch.setenv(name, "test")
+    monkeypatch.setenv("AWS_DEFAULT_REGION", "us-east-1")
+    server.start()
+    address = "http://{}:{}".format(*server.get_host_and_port())
+    urlopen(Request(f"{address}/anyview", method="PUT")).close()
+    yield "s3://anyview/cache", address
+    server.stop()
+
+
+@pytest.mark.slow
+def test_results_travel_through_an_s3_bucket(study, tmp_path, bucket):
+    url, address = bucket
+    study.run("dvc", "remote", "add", "--default", "shared", url)
+    study.run("dvc", "remote", "modify", "shared", "endpointurl", address)
+    study.run("dvc", "push", "--with-deps", "imitate@ours")
+    other = clone(study, tmp_path / "clone")
+    other.run("dvc", "pull", "--with-deps", "imitate@ours")
+    for folder in ("sim/diverse", "models/sim", "policies/ours"):
+        assert digests(other.folder / "data" / folder) == digests(study.folder / "data" / folder) != {}
+    assert "up to date" in other.run("dvc", "repro", "imitate@ours")

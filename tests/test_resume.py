@@ -1,176 +1,121 @@
 """Long stages, killed at random moments, continue and end with the bytes of an uninterrupted run."""
 
-import hashlib
 import os
 import random
-import shutil
 import signal
 import subprocess
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from ruamel.yaml import YAML
 
 from tests.conftest import Study
+from tests.long_stages import LONG_STAGES, change, digests
 
-SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
-KILLS = 4
-
-# Stage with its cell, output, and params that make the work last some seconds.
-CASES = {
-    "simulate": (
-        ["stages/simulate.py", "diverse"],
-        "data/sim/diverse",
-        {"simulate.diverse.demos": 240, "simulate.shard": 8},
-    ),
-    "ingest": (["stages/ingest.py"], "data/real/clips", {}),
-    "train": (
-        ["stages/train.py", "sim"],
-        "data/models/sim",
-        {"translation.cells.sim.iterations": 120, "translation.training.validation_every": 10},
-    ),
-    "imitate": (
-        ["stages/imitate.py", "ours"],
-        "data/policies/ours",
-        {"imitation.iterations": 15, "imitation.runs": 9},
-    ),
-}
+EXIT_CODES = {signal.SIGKILL: -signal.SIGKILL, signal.SIGTERM: 130, signal.SIGINT: 130}
 
 
-def change(study: Study, **values: object) -> None:
-    """Set dotted keys in the study's params.yaml."""
-    path = study.folder / "params.yaml"
-    yaml = YAML()
-    tree = yaml.load(path.read_text())
-    for key, value in values.items():
-        *parents, last = key.split(".")
-        branch = tree
-        for parent in parents:
-            branch = branch[parent]
-        branch[last] = value
-    with path.open("w") as file:
-        yaml.dump(tree, file)
+def checkpoints(scratch: Path) -> list[Path]:
+    """Finished checkpoints and units of work."""
+    return [path for path in scratch.rglob("checkpoints/*/*") if "partial" not in path.name]
 
 
-def digests(folder: Path) -> dict[str, str]:
-    return {
-        str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file()
-    }
+def wait_for_a_checkpoint(study: Study, process: subprocess.Popen[str]) -> None:
+    while not checkpoints(study.scratch):
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.02)
+
+
+def stop(process: subprocess.Popen[str], number: signal.Signals) -> str:
+    """Send a signal, Ctrl-C to the group as a terminal does; returns what was said on standard error."""
+    if number == signal.SIGINT:
+        os.killpg(process.pid, number)
+    else:
+        process.send_signal(number)
+    return process.communicate(timeout=180)[1]
 
 
 @pytest.fixture
-def study(smoke, tmp_path) -> Study:
-    """A copy of the smoke study, with an empty scratch folder."""
-    folder = tmp_path / "study"
-    shutil.copytree(smoke.folder, folder, ignore=shutil.ignore_patterns(".venv", "tmp"))
-    return Study(folder, tmp_path / "scratch")
+def begun(study) -> Callable[..., subprocess.Popen[str]]:
+    """Starts a command by two workers, with a checkpoint after every unit of work."""
 
+    def start(*command: str) -> subprocess.Popen[str]:
+        return study.start(*command, ANYVIEW_CHECKPOINT_SECONDS="0", ANYVIEW_WORKERS="2")
 
-def kill_at_random(study: Study, command: list[str], seconds: float, rng: random.Random) -> int:
-    """Start ``command`` and kill it; returns its exit code. ``seconds`` is what it takes to its end."""
-    number = rng.choice(SIGNALS)
-    process = study.start("python", *command, ANYVIEW_CHECKPOINT_SECONDS="0")
-    try:
-        process.communicate(timeout=1 + rng.random() * seconds)
-    except subprocess.TimeoutExpired:
-        if number == signal.SIGINT:
-            os.killpg(process.pid, number)  # as a terminal does
-        else:
-            process.send_signal(number)
-        process.communicate(timeout=180)
-    return process.returncode
-
-
-def checkpointed(scratch: Path) -> bool:
-    return any(path.is_file() and "partial" not in path.name for path in scratch.rglob("checkpoints/*/*"))
+    return start
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", CASES)
-def test_a_killed_stage_continues_to_the_same_bytes(study, case):
-    command, output, params = CASES[case]
-    change(study, **params)
-    began = time.monotonic()
-    study.run("python", *command)
-    seconds = time.monotonic() - began
-    expected = digests(study.folder / output)
-    assert expected
-    shutil.rmtree(study.folder / output)
-    shutil.rmtree(study.scratch / "checkpoints", ignore_errors=True)
+@pytest.mark.parametrize("name", LONG_STAGES)
+def test_a_killed_stage_continues_to_the_same_bytes(study, begun, undisturbed, name):
+    """Killed and continued by two workers, compared with one worker that nobody stopped.
 
-    rng = random.Random(case)
-    resumed = 0
-    for _ in range(KILLS):
-        code = kill_at_random(study, command, seconds, rng)
-        if code == 0 or (study.folder / output).exists():  # done before the signal: start over
-            assert digests(study.folder / output) == expected
-            shutil.rmtree(study.folder / output)
-        else:
-            resumed += checkpointed(study.scratch)
-    assert resumed > 0, "no kill fell into the work: nothing was shown"
-    study.run("python", *command)
-    assert digests(study.folder / output) == expected
-    leftovers = [path for path in (study.folder / "data").rglob(".*.partial")]
-    assert leftovers == []
-
-
-@pytest.mark.slow
-def test_changed_params_start_afresh(study):
-    """A checkpoint of other params is not taken up, and one of the same params still is."""
-    command, output, params = CASES["train"]
-    change(study, **params)
-    change(study, **{"base.seed": 7})
-    study.run("python", *command)
-    expected = digests(study.folder / output)
-    shutil.rmtree(study.scratch)
-    change(study, **{"base.seed": 8})
-    process = study.start("python", *command, ANYVIEW_CHECKPOINT_SECONDS="0")
-    while not checkpointed(study.scratch):
-        assert process.poll() is None
-        time.sleep(0.02)
-    process.kill()
-    process.wait()
-    change(study, **{"base.seed": 7})
-    study.run("python", *command)
-    assert digests(study.folder / output) == expected
+    The first signal falls into the work for certain, the others at any moment from the start on.
+    """
+    stage = LONG_STAGES[name]
+    expected, seconds = undisturbed(name)
+    folder = study.folder / stage.output
+    before = digests(folder)
+    assert before != expected
+    change(study.folder, stage.params)
+    rng = random.Random(name)
+    for turn, number in enumerate(rng.sample(list(EXIT_CODES), len(EXIT_CODES))):
+        process = begun("python", *stage.command)
+        if turn == 0:
+            wait_for_a_checkpoint(study, process)
+        time.sleep(rng.random() * seconds * (0.1 if turn == 0 else 0.6))
+        complaint = stop(process, number)
+        assert process.returncode in (EXIT_CODES[number], 0)
+        assert "Traceback" not in complaint
+        assert digests(folder) in (before, expected)  # an output stands or is replaced, both whole
+    begun("python", *stage.command).communicate()
+    assert digests(folder) == expected
+    assert checkpoints(study.scratch) == []
+    assert list((study.folder / "data").rglob(".*.partial")) == []
 
 
 @pytest.mark.slow
-def test_a_killed_dvc_repro_continues(study):
+def test_changed_params_start_afresh(study, begun, undisturbed):
+    """A checkpoint of other params is not taken up."""
+    stage = LONG_STAGES["train"]
+    change(study.folder, stage.params)
+    params = (study.folder / "params.yaml").read_text()
+    change(study.folder, {"base.seed": 8})
+    process = begun("python", *stage.command)
+    wait_for_a_checkpoint(study, process)
+    stop(process, signal.SIGKILL)
+    (study.folder / "params.yaml").write_text(params)
+    study.run("python", *stage.command)
+    assert digests(study.folder / stage.output) == undisturbed("train")[0]
+
+
+@pytest.mark.slow
+def test_changed_code_starts_afresh(study, begun):
+    """A checkpoint of other code is not taken up, whichever module it was."""
+    stage = LONG_STAGES["train"]
+    change(study.folder, stage.params)
+    for number in (1, 2):
+        process = begun("python", *stage.command)
+        while len(list(study.scratch.glob("checkpoints/*"))) < number:
+            assert process.poll() is None, process.communicate()
+            time.sleep(0.02)
+        if number == 1:
+            wait_for_a_checkpoint(study, process)
+        stop(process, signal.SIGKILL)
+        with (study.folder / "src/anyview/runtime/seeds.py").open("a") as file:
+            file.write("# other streams\n")
+
+
+@pytest.mark.slow
+def test_a_killed_dvc_repro_continues(study, begun, undisturbed):
     """The whole way: ``dvc repro`` killed in the middle of a stage, then ``dvc repro`` again."""
-    _, output, params = CASES["train"]
-    change(study, **params)
+    stage = LONG_STAGES["train"]
+    change(study.folder, stage.params)
     command = ["dvc", "repro", "--single-item", "train@sim"]
-    lock = (study.folder / "dvc.lock").read_text()
-    study.run(*command)
-    expected = digests(study.folder / output)
-    (study.folder / "dvc.lock").write_text(lock)
-    shutil.rmtree(study.scratch)
-    shutil.rmtree(study.folder / ".dvc" / "cache" / "runs", ignore_errors=True)
-    shutil.rmtree(study.folder / output)
-    process = study.start(*command, ANYVIEW_CHECKPOINT_SECONDS="0")
-    while not checkpointed(study.scratch):
-        assert process.poll() is None
-        time.sleep(0.02)
-    process.kill()
-    process.communicate()
-    said = study.run(*command)
-    assert "Running stage 'train@sim'" in said
-    assert digests(study.folder / output) == expected
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("case", ["simulate", "ingest", "imitate"])
-def test_one_worker_or_two_make_the_same_bytes(study, case):
-    command, output, params = CASES[case]
-    change(study, **params)
-    found = []
-    for workers in ("1", "2"):
-        study.run("python", *command, ANYVIEW_WORKERS=workers)
-        found.append(digests(study.folder / output))
-        shutil.rmtree(study.folder / output)
-        shutil.rmtree(study.scratch)
-    assert found[0] == found[1]
+    process = begun(*command)
+    wait_for_a_checkpoint(study, process)
+    stop(process, signal.SIGKILL)
+    assert "Running stage 'train@sim'" in study.run(*command)
+    assert digests(study.folder / stage.output) == undisturbed("train")[0]
+    assert "didn't change" in study.run(*command)

@@ -47,3 +47,11 @@ def test_the_folder_is_absolute_and_may_start_at_home(monkeypatch):
 def test_only_known_kinds(scratch):
     with pytest.raises(ValueError, match="scratch kinds"):
         scratch_folder("policies", "abc")
+
+
+def test_checkpoints_are_keyed_by_the_code_too(scratch):
+    """Frames follow from the clips alone; what is half done follows from the code that does it."""
+    assert scratch_folder("frames", "abc").name == "abc"
+    first = scratch_folder("checkpoints", "abc")
+    assert first.name.startswith("abc-")
+    assert scratch_folder("checkpoints", "abc") == first

@@ -8,7 +8,9 @@ import hashlib
 import json
 import os
 import shutil
+import sys
 from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -31,12 +33,25 @@ def content_key(values: Any, files: Iterable[Path] = ()) -> str:
 
 
 def scratch_folder(kind: str, key: str) -> Path:
-    """Folder ``<scratch>/<kind>/<key>``, created. ``kind`` is one of ``KINDS``."""
+    """Folder ``<scratch>/<kind>/<key>``, created. ``kind`` is one of ``KINDS``.
+
+    The key of checkpoints is extended by one of our code, so that an edit of any module starts afresh.
+    """
     if kind not in KINDS:
         raise ValueError(f"{kind}: scratch kinds are {', '.join(KINDS)}")
-    folder = scratch_root() / kind / key
+    folder = scratch_root() / kind / (f"{key}-{_code_key()}" if kind == "checkpoints" else key)
     folder.mkdir(parents=True, exist_ok=True)
     return folder
+
+
+@cache
+def _code_key() -> str:
+    """A key of every module that can change what is half done: the report comes after all of that."""
+    package = Path(__file__).parents[1]
+    modules = [path for path in package.rglob("*.py") if "report" not in path.relative_to(package).parts]
+    script = getattr(sys.modules["__main__"], "__file__", None)
+    paths = [*modules, Path(script)] if script else modules
+    return content_key([str(path.relative_to(package)) for path in sorted(modules)], paths)[:8]
 
 
 def scratch_size() -> int:
