@@ -115,6 +115,9 @@ def test_watch_plays_a_policy(study: Path, root: Path) -> None:
     assert ran.returncode == 0, ran.stderr
     assert "cm from the goal" in ran.stdout
     assert read_video(study / "out.mp4").shape == (50, 64, 64, 3)
+    ran = subprocess.run([*command, "--run", "8", "--json"], cwd=study, capture_output=True, text=True)
+    told = json.loads(ran.stdout)
+    assert told["success"] == (told["final_distance"] < 0.02)
     for arguments, complaint in (
         (["--run", "9", "-o", "out.mp4"], "no run 9; there are runs 0 to 8"),
         (["-o", "out.gif"], "out.gif: the output must end in"),

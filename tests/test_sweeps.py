@@ -1,0 +1,86 @@
+"""Sweeps as the tutorial has them, by the real `dvc exp`, at the `smoke` profile: which stages rerun."""
+
+import json
+import shutil
+import time
+
+import pytest
+from tests.conftest import Study
+
+from anyview.config import load_params, read_yaml
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def study(smoke, tmp_path_factory) -> Study:
+    """The smoke study, its results committed."""
+    folder = tmp_path_factory.mktemp("sweep") / "study"
+    shutil.copytree(smoke.folder, folder, symlinks=True, ignore=shutil.ignore_patterns("tmp", ".venv"))
+    copy = Study(folder, smoke.scratch)
+    for key, value in (("user.name", "A"), ("user.email", "a@example.org"), ("core.hooksPath", "/dev/null")):
+        copy.run("git", "config", key, value)
+    copy.run("git", "add", "-A")
+    copy.run("git", "commit", "-qm", "smoke")
+    return copy
+
+
+def cells(study: Study, source: str = "") -> set[str]:
+    """Stages of the imitation cells that read ``source``."""
+    found = load_params(study.folder / "params.yaml").imitation.cells
+    return {f"imitate@{name}" for name, cell in found.items() if cell.source.startswith(source)}
+
+
+def reran(study: Study) -> set[str]:
+    """Stages whose entry in dvc.lock is not the committed one."""
+    review = json.loads(study.run("anyview", "review", "HEAD", "--json"))
+    assert review["unchanged_stages"] + len(review["stages"]) == len(
+        read_yaml(study.folder / "dvc.lock")["stages"]
+    )
+    return {change["name"] for change in review["stages"]}
+
+
+def test_phi_reruns_no_data_and_no_translator(study):
+    """By `--dry`, which names the stages that a change reaches first: `report` follows them."""
+    path = study.folder / "params.yaml"
+    before = path.read_text()
+    path.write_text(before.replace("phi: ", "phi: 7"))
+    said = study.run("dvc", "repro", "--dry").splitlines()
+    path.write_text(before)
+    assert {line.split("'")[1] for line in said if line.startswith("Running stage")} == cells(study)
+
+
+def test_a_weight_of_a_loss_reruns_its_translator_and_what_follows(study):
+    key = "translation.cells.sim-no-alignment.weights.reconstruction"
+    study.run("dvc", "exp", "run", "-S", f"{key}=0.5")
+    assert reran(study) == {
+        "train@sim-no-alignment",
+        "translate@sim-no-alignment",
+        *cells(study, "data/models/sim-no-alignment"),
+        "report",
+    }
+    metric = "translation.sim-no-alignment.validation.translation"
+    told = json.loads(study.run("anyview", "sweep", key, "--metric", metric, "--json"))
+    assert [trial["value"] for trial in told["trials"]] == [0.5, 1.0]
+    study.run("git", "checkout", ".")
+    study.run("dvc", "checkout")
+
+
+def test_a_queue_of_one_method_and_the_report(study):
+    command = ("dvc", "exp", "run", "--queue", "-S", "imitation.reward.phi=0.01,0.1,1")
+    study.run(*command, "--single-item", "imitate@ours", "report")
+    study.run("bash", "-c", "dvc queue start > queue.log 2>&1")
+    deadline = time.monotonic() + 400
+    while "Queued" in (status := study.run("dvc", "queue", "status")) or "Running" in status:
+        assert time.monotonic() < deadline, status
+        time.sleep(2)
+    assert status.count("Success") == 3, status
+    told = json.loads(study.run("anyview", "sweep", "imitation.reward.phi", "--json"))
+    found = {trial["value"]: trial["experiment"] for trial in told["trials"]}
+    assert {0.01, 0.1, 1} <= found.keys()
+    assert (study.folder / "sweep.svg").is_file()
+    shown = study.run("dvc", "exp", "show", "--no-pager")
+    assert all(found[value] in shown for value in (0.01, 0.1))
+    study.run("dvc", "exp", "apply", found[0.01])
+    assert load_params(study.folder / "params.yaml").imitation.reward.phi == 0.01
+    assert reran(study) == {"imitate@ours", "report"}
