@@ -349,13 +349,11 @@ def attack(kind: str, folder: str, count: int, seed: int, results: "multiprocess
         signal.setitimer(signal.ITIMER_REAL, SECONDS)
         try:
             accepted = target.read() is not False
-        except AnyviewError as error:
-            accepted = False
-            if "\n" in str(error):
-                tally.breaches.append(f"{context}: a refusal of several lines")
         except (Exception, TooLong) as error:
             accepted = False
-            tally.breaches.append(f"{context}: {type(error).__name__}: {str(error)[:80]}")
+            explained = isinstance(error, AnyviewError) or (isinstance(error, OSError) and error.errno)
+            if not explained:  # by ``exit_code``, in a line
+                tally.breaches.append(f"{context}: {type(error).__name__}: {str(error)[:80]}")
         finally:
             signal.setitimer(signal.ITIMER_REAL, 0)
         if accepted and (way in target.notices or mutant == PICKLE) and kind != "record of a unit":

@@ -114,7 +114,8 @@ def test_a_well_formed_file_of_another_kind_is_refused(folder):
         body = len(header).to_bytes(8, "little") + header
         return b"anyview-checkpoint-1\n" + hashlib.sha256(body).hexdigest().encode() + b"\n" + body
 
-    for metadata in ({}, {"step": "x", "state": "{}"}, {"step": "1", "state": "{"}, {"step": "1"}):
+    nested = {"step": "1", "state": '{"a":' * 100_000}
+    for metadata in ({}, {"step": "x", "state": "{}"}, {"step": "1", "state": "{"}, {"step": "1"}, nested):
         (folder / "checkpoint-a").write_bytes(forge(metadata))
         assert Checkpoints(folder).load() is None
 

@@ -35,6 +35,7 @@ def test_a_result_is_made_once_and_is_the_same_from_the_record(unit):
         ("unit.json", b'{"files": [], "result": 1}'),
         ("unit.json", b'{"files": {"../../etc/passwd": "0"}, "result": 1}'),
         ("unit.json", b"\xff\xfe"),
+        ("unit.json", b'{"files":' * 100_000),
     ],
 )
 def test_it_is_made_again_when_file_or_record_is_missing_or_altered(unit, tmp_path, file, content):

@@ -99,5 +99,5 @@ def _read(path: Path) -> Checkpoint | None:
         arrays = load(body)
         metadata = json.loads(body[8 : 8 + int.from_bytes(body[:8], "little")])["__metadata__"]
         return int(metadata["step"]), arrays, json.loads(metadata["state"])
-    except (SafetensorError, ValueError, KeyError, TypeError):
+    except (SafetensorError, ValueError, KeyError, TypeError, RecursionError):
         return None

@@ -37,5 +37,5 @@ def _read(folder: Path, record_path: Path) -> tuple[bool, Any]:
         record = json.loads(record_path.read_text(encoding="utf-8"))
         whole = all(sha256(folder / file) == digest for file, digest in record["files"].items())
         return whole, record["result"]
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return False, None
