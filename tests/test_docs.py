@@ -1,0 +1,139 @@
+"""What the documents say can be followed: links, paths, commands, keys of params, names in the code."""
+
+import re
+import shlex
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import typer
+from dvc.cli import parse_args
+
+from anyview import cli
+from anyview.config import load_params
+from anyview.report.review import flat
+
+ROOT = Path(__file__).parents[1]
+DOCUMENTS = sorted(
+    ROOT / name
+    for name in subprocess.run(
+        ["git", "ls-files", "*.md"], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout.split()
+)
+OTHERS = {"git", "cd", "source", ".", "open", "pre-commit", "python", "echo", "ls", "docker", "ray", "pip"}
+"""Programs that are not ours: the documents may call them, nothing else."""
+
+each_document = pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+
+
+def prose(path: Path) -> str:
+    return re.sub(r"^```.*?^```", "", path.read_text(encoding="utf-8"), flags=re.M | re.S)
+
+
+def anchors(path: Path) -> set[str]:
+    """What GitHub makes of a document's headings."""
+    titles = re.findall(r"^#+ (.+)$", prose(path), re.M)
+    return {re.sub(r"[^\w -]", "", title.lower()).strip().replace(" ", "-") for title in titles}
+
+
+@each_document
+def test_links_lead_somewhere(path):
+    for link in re.findall(r"\]\(([^)\s]+)\)", prose(path)):
+        if link.startswith(("https://", "http://", "mailto:")):
+            continue
+        name, _, anchor = link.partition("#")
+        target = (path.parent / name).resolve() if name else path
+        assert target.exists(), link
+        assert not anchor or anchor in anchors(target), link
+
+
+@each_document
+def test_paths_in_the_text_exist(path):
+    """Files of the repository that are named in `code`; `<stage>`, `*` and what DVC makes aside."""
+    for name in re.findall(
+        r"`((?:src|stages|tests|docs|profiles|benchmarks|examples|\.dvc)/[^`\s]*)`", prose(path)
+    ):
+        if not re.search(r"[<*{]", name):
+            assert (ROOT / name).exists(), name
+
+
+@each_document
+def test_names_in_the_code_exist(path):
+    """`anyview.runtime.seeds.stream` and `Class.field`."""
+    for name in re.findall(r"`(anyview(?:\.\w+)+)(?:\([^`]*\))?`", prose(path)):
+        parts = name.split(".")
+        module = next(
+            ROOT.joinpath("src", *parts[:length]).with_suffix(".py")
+            for length in range(len(parts), 0, -1)
+            if ROOT.joinpath("src", *parts[:length]).with_suffix(".py").is_file()
+            or ROOT.joinpath("src", *parts[:length]).is_dir()
+        )
+        if module.is_file() and parts[-1] != module.stem:
+            assert re.search(rf"^(?:def|class) {parts[-1]}\b|^{parts[-1]}\b.*=", module.read_text(), re.M), (
+                name
+            )
+
+
+@each_document
+def test_keys_of_params_exist(path):
+    params = load_params(ROOT / "params.yaml").model_dump()
+    keys = {key for key, _ in flat(params)}
+    blocks = {key.rsplit(".", count)[0] for key in keys for count in range(1, key.count(".") + 1)}
+    text = path.read_text(encoding="utf-8")
+    named = re.findall(rf"`((?:{'|'.join(params)})\.[\w.-]+[\w])(?:: [^`]*)?`", prose(path))
+    named += re.findall(r"-S '?([\w.-]+)=", text)
+    unknown = {"imitation.reward.phy"} | ({name for name in named if name.endswith(".py")})
+    assert {name for name in named if "<" not in name} - keys - blocks - unknown == set()
+
+
+def commands() -> Iterator[tuple[str, str]]:
+    """Every line of the documents' shell blocks, and every `command` of ours in their text."""
+    for path in DOCUMENTS:
+        text = path.read_text(encoding="utf-8")
+        for block in re.findall(r"^```sh\n(.*?)^```", text, re.M | re.S):
+            for line in block.replace("\\\n", " ").splitlines():
+                if line.strip():
+                    yield path.name, line.strip()
+        yield from (
+            (path.name, " ".join(line.split()))
+            for line in re.findall(r"`((?:make|dvc|anyview) [^`]+)`", prose(path))
+        )
+
+
+@pytest.mark.parametrize(("name", "line"), sorted(set(commands())))
+def test_commands_are_understood(name, line):
+    """By the parsers of the programs themselves: no such command, option or target would pass."""
+    for part in re.split(r"&&|;| \| ", re.sub(r"(^|\s)#.*", "", line)):
+        words = [word for word in shlex.split(part.split(" > ")[0]) if word != "..."]
+        if not words:
+            continue
+        program, arguments = words[0].removeprefix(".venv/bin/"), words[1:]
+        if program == "anyview":
+            understood_by_anyview(arguments)
+        elif program == "dvc":
+            understood_by_dvc(arguments)
+        elif program == "make":
+            targets = [word for word in arguments if "=" not in word and not word.startswith("<")]
+            subprocess.run(["make", "-n", *targets], cwd=ROOT, check=True, capture_output=True)
+        else:
+            assert program in OTHERS, line
+
+
+def understood_by_dvc(arguments: list[str]) -> None:
+    if len(arguments) > 1:
+        parse_args(arguments)
+        return
+    with pytest.raises(SystemExit) as ended:
+        parse_args([*arguments, "--help"])
+    assert ended.value.code == 0
+
+
+def understood_by_anyview(arguments: list[str]) -> None:
+    group = typer.main.get_command(cli.app)
+    if not arguments or arguments[0].startswith("-"):
+        return
+    command = group.get_command(None, arguments[0])
+    assert command is not None, arguments
+    if arguments[1:]:
+        command.make_context(arguments[0], arguments[1:])
