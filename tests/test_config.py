@@ -1,4 +1,5 @@
 import copy
+import math
 import random
 from collections.abc import Callable
 from itertools import pairwise
@@ -81,6 +82,8 @@ def test_the_committed_params_are_sound():
             "real.film.width: Input should be less than or equal to 1920, got 100000",
         ),
         ("sim", None, "sim: Input should be a valid dictionary"),
+        ("real.ingest.rate", math.inf, "real.ingest.rate: Input should be a finite number, got inf"),
+        ("real.ingest.frames", 10**6, "real.ingest.frames: Input should be less than or equal to 10000"),
     ],
 )
 def test_an_impossible_value_is_named(path, value, said):
@@ -94,6 +97,13 @@ def test_a_missing_key_is_named():
     values = copy.deepcopy(VALUES)
     del values["imitation"]["reward"]["phi"]
     with pytest.raises(AnyviewError, match=r"^params.yaml: imitation.reward.phi: missing key$"):
+        parse_params(values)
+
+
+def test_of_a_misspelt_key_the_wrong_name_is_said_and_not_the_right_one():
+    values = copy.deepcopy(VALUES)
+    values["imitation"]["reward"]["phy"] = values["imitation"]["reward"].pop("phi")
+    with pytest.raises(AnyviewError, match=r"imitation.reward.phy: unknown key \(and 1 more\)$"):
         parse_params(values)
 
 

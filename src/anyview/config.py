@@ -33,9 +33,9 @@ Discount = Annotated[float, Field(ge=0, lt=1)]
 
 
 class Block(BaseModel):
-    """A block of params: no unknown keys, no silent conversions."""
+    """A block of params: no unknown keys, no silent conversions, no infinities."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
 
 class Base(Block):
@@ -82,7 +82,7 @@ class Ingest(Block):
     """Stage `ingest`: raw clips to aligned small ones."""
 
     size: Literal[32, 48, 64] = Field(description="height and width of a clip in pixels")
-    frames: int = Field(ge=8, description="frames of a clip")
+    frames: int = Field(ge=8, le=10_000, description="frames of a clip")
     rate: Positive = Field(description="frames per second after resampling")
     max_megabytes: Positive = Field(description="a larger raw file is refused")
 
@@ -319,7 +319,8 @@ def load_params(path: Path = Path("params.yaml")) -> Params:
 
 
 def _explain(error: ValidationError) -> str:
-    first, *others = error.errors()
+    # Unknown keys first: one that is missing beside them is most often the same one, misspelt.
+    first, *others = sorted(error.errors(), key=lambda found: found["type"] != "extra_forbidden")
     tags = {"translator", "time-contrastive"}
     key = ".".join(str(part) for part in first["loc"] if part not in tags) or "the file"
     if first["type"] == "extra_forbidden":

@@ -21,7 +21,7 @@ def record(
         ),
     ] = None,
     pair: Annotated[
-        str | None, typer.Option(help="Id of this demonstration [default: the next free]")
+        str | None, typer.Option(help="Id of this demonstration; without it, the next free one.")
     ] = None,
     kind: Annotated[
         str, typer.Option(help="standard, distractor, extreme_view or extreme_distractor.")
