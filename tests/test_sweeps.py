@@ -5,9 +5,9 @@ import shutil
 import time
 
 import pytest
-from tests.conftest import Study
 
 from anyview.config import read_yaml
+from tests.conftest import Study
 
 pytestmark = pytest.mark.slow
 

@@ -73,6 +73,28 @@ def test_ratio_of_means_covers_the_true_ratio():
     assert estimate.high - estimate.low < 0.25
 
 
+def test_a_ratio_draws_the_views_of_a_pair_together():
+    """As for a mean: a doubled sample in groups of two says no more than the sample alone."""
+    rng = np.random.default_rng(0)
+    above, below = rng.normal(5.4, 1, 200), rng.normal(2, 0.4, 200)
+    alone = Estimator(1).ratio_of_means("x", above, below)
+    pairs = np.repeat(np.arange(200), 2)
+    doubled = Estimator(1).ratio_of_means("x", np.repeat(above, 2), np.repeat(below, 2), (pairs, pairs))
+    assert doubled.value == pytest.approx(alone.value)
+    assert doubled.high - doubled.low == pytest.approx(alone.high - alone.low, rel=0.05)
+
+
+def test_a_share_keeps_its_pairs():
+    """Where part and whole rise and fall together the share hardly varies; drawn apart it would."""
+    whole = np.random.default_rng(0).normal(10, 3, 100)
+    share, apart = (
+        Estimator(1).share("x", 0.4 * whole, whole),
+        Estimator(1).ratio_of_means("x", 0.4 * whole, whole),
+    )
+    assert share.value == pytest.approx(0.4)
+    assert share.high - share.low < 1e-9 < 0.02 < apart.high - apart.low
+
+
 def test_bounds_repeat_and_depend_on_seed_and_name_alone():
     values = np.random.default_rng(0).normal(0, 1, 15)
     assert Estimator(1).median("x", values) == Estimator(1).median("x", values)

@@ -30,22 +30,33 @@ class Estimator:
 
     def mean(self, name: str, values: np.ndarray, groups: np.ndarray | None = None) -> Estimate:
         """Mean of ``values`` (n,); those of one group (``groups``: (n,)) are drawn together."""
-        value = float(np.mean(values))
-        if groups is None:
-            return Estimate(value, *bootstrap_interval(values, np.mean, self._stream(name)))
-        _, members = np.unique(groups, return_inverse=True)
-        sums = np.stack([np.bincount(members, weights=values), np.bincount(members)], axis=1)
-        return Estimate(value, *bootstrap_interval(sums, _mean_of_sums, self._stream(name)))
+        sums = _sums(values, groups)
+        return Estimate(float(np.mean(values)), *bootstrap_interval(sums, _ratio_of_sums, self._stream(name)))
 
     def median(self, name: str, values: np.ndarray) -> Estimate:
         """Median of ``values`` (n,)."""
         return Estimate(float(np.median(values)), *bootstrap_interval(values, np.median, self._stream(name)))
 
-    def ratio_of_means(self, name: str, above: np.ndarray, below: np.ndarray) -> Estimate:
-        """mean(above) / mean(below) of two independent samples."""
+    def ratio_of_means(
+        self,
+        name: str,
+        above: np.ndarray,
+        below: np.ndarray,
+        groups: tuple[np.ndarray, np.ndarray] | None = None,
+    ) -> Estimate:
+        """mean(above) / mean(below) of two independent samples; ``groups`` of each as in ``mean``."""
         rng = self._stream(name)
-        draws = resampled(above, rng).mean(axis=1) / resampled(below, rng).mean(axis=1)
-        return Estimate(float(np.mean(above) / np.mean(below)), *quantile_interval(draws))
+        samples = zip((above, below), groups or (None, None), strict=True)
+        means = [_ratio_of_sums(resampled(_sums(*sample), rng), axis=1) for sample in samples]
+        return Estimate(float(np.mean(above) / np.mean(below)), *quantile_interval(means[0] / means[1]))
+
+    def share(self, name: str, part: np.ndarray, whole: np.ndarray) -> Estimate:
+        """mean(part) / mean(whole) of pairs (n,), which are drawn together."""
+        pairs = np.stack([part, whole], axis=1)
+        return Estimate(
+            float(np.mean(part) / np.mean(whole)),
+            *bootstrap_interval(pairs, _ratio_of_sums, self._stream(name)),
+        )
 
     def _stream(self, name: str) -> np.random.Generator:
         return stream(self.seed, f"bootstrap/{name}")
@@ -56,7 +67,13 @@ def proportion(successes: int, trials: int) -> Estimate:
     return Estimate(successes / trials, *wilson_interval(successes, trials))
 
 
-def _mean_of_sums(draws: np.ndarray, axis: int) -> np.ndarray:
-    """Means of draws (RESAMPLES, groups, 2) of (sum, count)."""
+def _sums(values: np.ndarray, groups: np.ndarray | None) -> np.ndarray:
+    """(sum, count) of each group of ``values`` (n,), as (groups, 2); each value alone without ``groups``."""
+    _, members = np.unique(np.arange(len(values)) if groups is None else groups, return_inverse=True)
+    return np.stack([np.bincount(members, weights=values), np.bincount(members)], axis=1)
+
+
+def _ratio_of_sums(draws: np.ndarray, axis: int) -> np.ndarray:
+    """Of draws (RESAMPLES, n, 2): the first column's sum over the second's."""
     totals = draws.sum(axis=axis)
     return totals[..., 0] / totals[..., 1]

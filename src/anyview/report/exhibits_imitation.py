@@ -17,7 +17,6 @@ from anyview.report.words import (
     ABSENT,
     centimetres,
     centimetres_spread,
-    number,
     plural,
     probability,
     rate_spread,
@@ -35,7 +34,7 @@ def section(study: Study, metrics: Tree) -> Section:
         *_success(study, 20, ablated(study.evaluations), "without a loss"),
         *_differences(comparisons),
         *_factorial(study),
-        *_returns(study),
+        *_returns(study, metrics),
         *_learning(study),
         *_reasons(study),
         *_rollouts(study),
@@ -127,29 +126,38 @@ def _factorial(study: Study) -> Iterator[Exhibit]:
     )
 
 
-def _returns(study: Study) -> Iterator[Exhibit]:
-    tables = {
-        cell: study.evaluations[cell].runs
-        for cell in in_order(study.evaluations)
-        if study.evaluations[cell].has_return_table
-    }
-    if not tables:
+def _returns(study: Study, metrics: Tree) -> Iterator[Exhibit]:
+    cells = [cell for cell in in_order(study.evaluations) if study.evaluations[cell].has_return_table]
+    if not cells:
         return
     names = ("return_still", "return_arm_only", "return_policy", "return_expert")
-    rows = tuple(
-        (label(cell), *(number(runs[name].mean()) for name in names)) for cell, runs in tables.items()
-    )
+    rows = tuple((label(cell), *(spread(*_bounds(metrics[cell], name)) for name in names)) for cell in cells)
+    shares = {cell: both for cell in cells if (both := _shares(study, cell)) is not None}
     yield Exhibit(
         "returns",
         "What each reward pays for",
         (
             "Returns under each method’s own reward, mean over the runs. The gap between the arm alone "
             "and the expert’s motion is what the object carries: a reward without that gap cannot teach "
-            "pushing, whatever learns from it. It is known before any policy is trained.",
+            "pushing, whatever learns from it. It is known before any policy is trained. A method under "
+            "whose reward the expert earns no more than standing still is in the table alone.",
         ),
-        to_svg(figures.returns(tables)),
+        to_svg(figures.returns(shares)) if shares else "",
         table=Table(("Method", "Standing still", "Arm without object", "Policy", "Expert’s motion"), rows),
     )
+
+
+def _shares(study: Study, cell: str) -> tuple[Estimate, Estimate] | None:
+    """What the arm without the object, and the policy, win of the expert's gain over standing still."""
+    runs, estimator = study.evaluations[cell].runs, Estimator(study.params.base.seed)
+    gains = (runs["return_expert"] - runs["return_still"]).to_numpy(float)
+    if gains.mean() <= 0:
+        return None
+    arm, policy = (
+        estimator.share(f"{cell}/{name}/share", (runs[name] - runs["return_still"]).to_numpy(float), gains)
+        for name in ("return_arm_only", "return_policy")
+    )
+    return arm, policy
 
 
 def _learning(study: Study) -> Iterator[Exhibit]:
@@ -203,8 +211,9 @@ def _rollouts(study: Study) -> Iterator[Exhibit]:
         "rollouts",
         "The trained policies, playing",
         (
-            "Left the agent, right the demonstration that it imitates as it expects to see it. The first "
-            f"{plural(len(runs), 'run')}, not picked by outcome; each run is one context, the same for "
+            "Left the agent, right the demonstration that it imitates: translated into its view, for the "
+            "Oracle as it truly looks there, for the TCN embedding, TPIL and GAIL as filmed elsewhere. The "
+            f"first {plural(len(runs), 'run')}, not picked by outcome; each run is one context, the same for "
             "every method. Below each: how far the object ends from the goal.",
         ),
         reels=tuple(reels),

@@ -12,7 +12,7 @@ from anyview.report.figures.style import to_svg
 from anyview.report.inputs import Study, Training, Translation
 from anyview.report.metrics import Tree, extreme_ratio
 from anyview.report.pictures import Strip, make_film, make_strip
-from anyview.report.words import ABSENT, NOT_STATED, number, plural, spread
+from anyview.report.words import ABSENT, NOT_STATED, listed, number, plural, published, spread
 
 ADAM, ADADELTA, AUGMENTED, SIM = "real-adam", "real-adadelta", "real-augmented", "sim"
 _REEL_CLIPS = 4
@@ -33,7 +33,7 @@ def section(study: Study, metrics: Tree) -> Section:
         "Losses are on the thesis’s scale as far as it can be inferred: half the sum of squares over a "
         "batch of 100 frames for translation and reconstruction, 1,000 times the mean square for "
         "alignment, all weights 1. Intervals are over clips, the two views of one demonstration drawn "
-        "together.",
+        "together; a curve, or a number without an interval, is one training or one clip.",
     )
     return Section("translator", "The context translator", text, exhibits)
 
@@ -69,12 +69,12 @@ def _training_table(training: Training, reference: thesis.TrainingRun) -> Table:
         ("Validation loss", "validation_loss", reference.validation),
     ):
         curve = training.losses(column)
-        start = NOT_STATED if stated.start is None else number(stated.start)
-        minimum = _at(stated.minimum, stated.minimum_iteration)
+        start = NOT_STATED if stated.start is None else published(stated.start)
+        minimum = f"{published(stated.minimum)} at\u00a0{stated.minimum_iteration:,}"
         by_500 = curve[curve.index <= max(500, curve.index[0])]
         rows += [
             (f"{name}, first", start, _at(curve.iloc[0], curve.index[0])),
-            (f"{name}, by iteration 500", number(stated.at_500), _at(by_500.iloc[-1], by_500.index[-1])),
+            (f"{name}, by iteration 500", published(stated.at_500), _at(by_500.iloc[-1], by_500.index[-1])),
             (f"{name}, minimum", minimum, _at(curve.min(), curve.idxmin())),
         ]
     return Table(("", "Thesis", "Here"), tuple(rows))
@@ -88,15 +88,15 @@ def _optimisers(study: Study, cell: str) -> Iterator[str]:
     """Adam against AdaDelta at the last validation that both have reached, as it comes out."""
     if cell != ADADELTA or ADAM not in study.trainings:
         return
+    minima = [published(run.validation.minimum) for run in (thesis.ADAM, thesis.ADADELTA)]
     curves = [study.trainings[name].losses("validation_loss") for name in (ADAM, ADADELTA)]
     shared = curves[0].index.intersection(curves[1].index)
     if len(shared):
         at = int(shared.max())
         yield (
             f"At equal iterations ({at:,}), the validation loss is {number(curves[0][at])} with Adam and "
-            f"{number(curves[1][at])} with AdaDelta; one training each. The thesis’s two minima, "
-            f"{number(thesis.ADAM.validation.minimum)} and {number(thesis.ADADELTA.validation.minimum)}, "
-            "are not at equal iterations."
+            f"{number(curves[1][at])} with AdaDelta; one training each. The thesis’s minima, "
+            f"{listed(minima)}, are not at equal iterations."
         )
 
 
@@ -106,17 +106,19 @@ def _feature_weights(study: Study) -> Iterator[Exhibit]:
     weights = study.translations[ADAM].feature_weights
     means = []
     for first, last, stated in thesis.FEATURE_WEIGHTS:
-        here = number(weights[first : last + 1].mean()) if len(weights) == thesis.FRAMES else ABSENT
-        means.append((f"Frames {first} to {last}", f"{stated:g}" if stated else "about 0", here))
+        here = f"{weights[first : last + 1].mean():.3f}" if len(weights) == thesis.FRAMES else ABSENT
+        scaled = f"{stated * thesis.feature_weight_scale():.3f}"
+        means.append((f"Frames {first} to {last}", f"{stated:.3f}" if stated else "about 0", scaled, here))
     yield Exhibit(
         "figure-15",
         "Figure 15. How much each frame of the expert’s clip matters",
         (
             "Permutation importance: how much the translation loss rises when a frame is replaced by "
-            "frames of other times. Ours sum to 1; the thesis’s values cannot, so only the shapes compare.",
+            "frames of other times. Ours sum to 1; the thesis’s values cannot, so only the shapes compare: "
+            "its line is scaled to sum to 1, with gaps where it states nothing. One training: no interval.",
         ),
         to_svg(figures.feature_weights(weights)),
-        comparison=Table(("Mean weight", "Thesis", "Here"), tuple(means)),
+        comparison=Table(("Mean weight", "Thesis", "Scaled", "Here"), tuple(means)),
         surrogate=study.surrogate,
     )
 
@@ -130,10 +132,10 @@ def _validation_strip(study: Study, metrics: Tree) -> Iterator[Exhibit]:
     validation = metrics[ADAM]["validation"]
     count = len(translation.split("validation"))
     rows = (
-        ("Loss of the example", number(thesis.STRIP_EXAMPLE_LOSS), number(loss)),
+        ("Loss of the example", published(thesis.STRIP_EXAMPLE_LOSS), number(loss)),
         (
             f"Mean loss ({thesis.VALIDATION_CLIPS} clips; {count} here)",
-            number(thesis.VALIDATION_LOSS),
+            published(thesis.VALIDATION_LOSS),
             _metric(validation, "loss"),
         ),
         ("PSNR (dB)", NOT_STATED, _metric(validation, "psnr")),
@@ -158,7 +160,7 @@ def _extreme(study: Study, metrics: Tree) -> Iterator[Exhibit]:
     rows = [
         (
             f"Mean loss, extreme ({cell})",
-            number(thesis.EXTREME_LOSS) if cell == ADAM else ABSENT,
+            published(thesis.EXTREME_LOSS) if cell == ADAM else ABSENT,
             _metric(metrics[cell]["extreme"], "loss"),
         )
         for cell in cells
@@ -203,7 +205,7 @@ def _simulation(study: Study, metrics: Tree) -> Iterator[Exhibit]:
     translation = study.translations[SIM]
     validation = metrics[SIM]["validation"]
     rows = (
-        ("Mean loss", number(thesis.SIMULATION_LOSS), _metric(validation, "loss")),
+        ("Mean loss", published(thesis.SIMULATION_LOSS), _metric(validation, "loss")),
         (
             "Translation loss of the last frame",
             NOT_STATED,

@@ -68,8 +68,13 @@ def imitation_metrics(study: Study) -> Tree:
 
 def extreme_ratio(estimator: Estimator, cell: str, translation: Translation) -> Estimate:
     """Mean L_tr of the extreme clips over mean L_tr of the validation clips."""
-    extreme, validation = (translation.split(name)["translation"] for name in ("extreme", "validation"))
-    return estimator.ratio_of_means(f"{cell}/ratio", extreme.to_numpy(), validation.to_numpy())
+    extreme, validation = (translation.split(name) for name in ("extreme", "validation"))
+    return estimator.ratio_of_means(
+        f"{cell}/ratio",
+        extreme["translation"].to_numpy(float),
+        validation["translation"].to_numpy(float),
+        (extreme["pair"].to_numpy(), validation["pair"].to_numpy()) if "pair" in extreme else None,
+    )
 
 
 def write_metrics(path: Path, metrics: Tree) -> None:

@@ -17,6 +17,7 @@ from anyview.report.words import (
     number,
     percent,
     percent_spread,
+    published,
 )
 
 ACTIONS = 49
@@ -80,8 +81,8 @@ def headlines(translation: Tree, imitation: Tree) -> Iterator[Headline]:
         yield Headline(
             "Translator, simulated clips",
             number(loss),
-            f"loss, 95%: {number(bounds[0])} to {number(bounds[1])}; thesis {number(thesis.SIMULATION_LOSS)} "
-            f"in another scene",
+            f"loss, 95%: {number(bounds[0])} to {number(bounds[1])}; "
+            f"thesis {published(thesis.SIMULATION_LOSS)} in another scene",
         )
 
 
@@ -117,6 +118,11 @@ def _scale(study: Study) -> Iterator[tuple[str, str, str]]:
         thesis_counts = (thesis.TRAIN_CLIPS, thesis.VALIDATION_CLIPS, thesis.EXTREME_CLIPS)
         stated = "{} train, {} validation and {} extreme".format(*thesis_counts)
         yield "Real clips" + (" (here: surrogate)" if study.surrogate else ""), stated, here
+    if study.trainings:
+        sim = params.translation.cells["sim"]
+        if sim.method == "translator":
+            yield "Network of the sim translator", "sim", sim.architecture
+        yield "Frames in a batch", str(thesis.BATCH), str(params.translation.training.batch_size)
     lengths = {cell: int(training.curve["iteration"].max()) for cell, training in study.trainings.items()}
     for cell, reference in (("real-adam", thesis.ADAM), ("real-adadelta", thesis.ADADELTA), ("sim", None)):
         if cell in lengths:
@@ -128,7 +134,8 @@ def _scale(study: Study) -> Iterator[tuple[str, str, str]]:
     imitation = params.imitation
     yield "Runs of a method", str(thesis.RUNS), str(imitation.runs)
     steps = imitation.iterations * imitation.episodes_per_iteration * ACTIONS
-    yield "Environment steps of a run", NOT_STATED, f"{steps:,} ({imitation.iterations} iterations)"
+    yield "Iterations of a policy", str(thesis.POLICY_ITERATIONS), str(imitation.iterations)
+    yield "Environment steps of a run", NOT_STATED, f"{steps:,}"
     yield "Demonstrations averaged in a reward", NOT_STATED, str(imitation.reward.demonstrations)
     yield "Seed", "42", str(params.base.seed)
 
@@ -160,10 +167,7 @@ def _data(data: Tree) -> Iterator[Exhibit]:
                 "Clips that came through ingest, clips that it refused, and the splits; pairs of views "
                 "stay together.",
             ),
-            table=Table(
-                ("", *(name.capitalize() for name in names)),
-                (("Clips", *(str(real[name]) for name in names)),),
-            ),
+            table=Table(("", "Clips"), tuple((name.capitalize(), str(real[name])) for name in names)),
             surrogate=bool(real["surrogate"]),
         )
 

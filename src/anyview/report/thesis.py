@@ -3,6 +3,7 @@
 Losses are sums over a batch of 100; that scale is inferred from their size, the thesis does not state it.
 """
 
+import math
 from dataclasses import dataclass
 
 RUNS = 15
@@ -81,11 +82,19 @@ DEMONSTRATIONS = 4_000
 TRAIN_CLIPS = 122
 """Data: simulated demonstrations, and real training clips."""
 
+BATCH = 100
+POLICY_ITERATIONS = 250
+"""Scale: frames in a batch of the translator's training, and iterations of a policy's."""
+
+
+def feature_weight_scale() -> float:
+    """What brings figure 15's stated weights to a sum of 1."""
+    return 1 / sum(weight * (last + 1 - first) for first, last, weight in FEATURE_WEIGHTS)
+
 
 def feature_weight_shape() -> list[float]:
-    """Figure 15 over its 80 frames, scaled to sum to 1; unstated frames count as 0."""
-    weights = [0.0] * FRAMES
+    """Figure 15 over its 80 frames, scaled so that the stated ones sum to 1; the others are NaN."""
+    weights = [math.nan] * FRAMES
     for first, last, weight in FEATURE_WEIGHTS:
-        weights[first : last + 1] = [weight] * (last + 1 - first)
-    total = sum(weights)
-    return [weight / total for weight in weights]
+        weights[first : last + 1] = [weight * feature_weight_scale()] * (last + 1 - first)
+    return weights

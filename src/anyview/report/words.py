@@ -18,8 +18,15 @@ def number(value: float) -> str:
     return text.replace("-", "−")
 
 
+def published(value: float) -> str:
+    """A number of the thesis, every digit of it: 47,564."""
+    return f"{value:,}"
+
+
 def spread(value: float, low: float, high: float) -> str:
-    """A value with its 95% bounds: 23.1 [21.8, 24.4]."""
+    """A value with its 95% bounds: 23.1 [21.8, 24.4]; alone where it comes from a single draw."""
+    if low == high:
+        return number(value)
     return _unbroken(f"{number(value)} [{number(low)}, {number(high)}]")
 
 

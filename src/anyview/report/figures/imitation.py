@@ -109,23 +109,30 @@ def learning(
         return figure
 
 
-def returns(tables: Mapping[str, pd.DataFrame]) -> Figure:
-    """The return table, mean over runs: 0 is standing still, 1 the expert's own motion."""
-    with canvas(0.38 * len(tables) + 1.05) as (figure, (axis,)):
-        styles = {
-            "return_arm_only": ("arm without object", "s", VERMILLION),
-            "return_policy": ("policy", "o", BLUE),
-        }
+def returns(shares: Mapping[str, tuple[Estimate, Estimate]]) -> Figure:
+    """What the arm without the object, and the policy, win of what the expert's motion earns, with intervals.
+
+    As shares of the expert's gain over standing still, (arm, policy) for each cell.
+    """
+    with canvas(0.38 * len(shares) + 1.05) as (figure, (axis,)):
+        styles = (("arm without object", "s", VERMILLION, -0.12), ("policy", "o", BLUE, 0.12))
         axis.axvline(0, color=QUIET, linewidth=1)
         axis.axvline(1, color=QUIET, linewidth=1)
-        for place, table in enumerate(tables.values()):
-            scale = table["return_expert"] - table["return_still"]
-            for column, (name, marker, color) in styles.items():
-                share = ((table[column] - table["return_still"]) / scale).mean()
-                axis.plot(share, place, marker, color=color, markersize=7, label=name if place == 0 else None)
-        axis.set_yticks(range(len(tables)), [_label(cell) for cell in tables])
-        axis.set(xlabel="return (0: standing still, 1: expert)")
-        _tidy_rows(axis, len(tables))
+        for place, both in enumerate(shares.values()):
+            for share, (name, marker, color, shift) in zip(both, styles, strict=True):
+                axis.errorbar(
+                    share.value,
+                    place + shift,
+                    xerr=[[share.value - share.low], [share.high - share.value]],
+                    fmt=marker,
+                    color=color,
+                    markersize=6,
+                    capsize=3,
+                    label=name if place == 0 else None,
+                )
+        axis.set_yticks(range(len(shares)), [_label(cell) for cell in shares])
+        axis.set(xlabel="return (0: standing still, 1: expert), 95%")
+        _tidy_rows(axis, len(shares))
         figure.legend(loc="outside upper right", ncols=2)
         return figure
 

@@ -37,7 +37,10 @@ def training(curve: pd.DataFrame, reference: thesis.TrainingRun) -> Figure:
 
 
 def feature_weights(weights: np.ndarray) -> Figure:
-    """Figure 15: weight of each frame, (T,), beside the thesis's shape scaled to the same sum of 1."""
+    """Figure 15: weight of each frame, (T,), beside the thesis's, scaled to the same sum of 1.
+
+    The thesis's line has gaps where its text states nothing.
+    """
     with canvas(2.8) as (figure, (axis,)):
         frames = np.arange(len(weights))
         axis.bar(frames, weights, width=1.0, color=SKY, edgecolor=BLUE, linewidth=0.3, label="here")
@@ -46,7 +49,7 @@ def feature_weights(weights: np.ndarray) -> Figure:
             axis.step(frames, shape, where="mid", color=THESIS["color"], label="thesis, scaled to sum to 1")
         axis.set(xlabel="frame", ylabel="feature weight", xlim=(-1, len(weights)))
         axis.grid(axis="x", visible=False)
-        axis.legend()
+        figure.legend(loc="outside upper right", ncols=2)
         return figure
 
 
