@@ -82,6 +82,7 @@ def test_the_committed_params_are_sound():
             "real.film.width: Input should be less than or equal to 1920, got 100000",
         ),
         ("sim", None, "sim: Input should be a valid dictionary"),
+        ("split.sim.validation", 0.0, "split.sim.validation: Input should be greater than 0, got 0.0"),
         ("real.ingest.rate", math.inf, "real.ingest.rate: Input should be a finite number, got inf"),
         ("real.ingest.frames", 10**6, "real.ingest.frames: Input should be less than or equal to 10000"),
     ],

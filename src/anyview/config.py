@@ -100,7 +100,7 @@ class Real(Block):
 class SplitSim(Block):
     """Split of a simulated set."""
 
-    validation: Fraction = Field(description="fraction of the demonstrations held out")
+    validation: float = Field(gt=0, lt=1, description="fraction of the demonstrations held out")
 
 
 class SplitReal(Block):
