@@ -70,10 +70,10 @@ def test_a_queue_of_one_method_and_the_report(study):
     command = ("dvc", "exp", "run", "--queue", "-S", "imitation.reward.phi=0.01,0.1,1")
     study.run(*command, "--single-item", "imitate@ours", "report")
     study.run("bash", "-c", "dvc queue start > queue.log 2>&1")
-    deadline = time.monotonic() + 400
+    deadline = time.monotonic() + 900
     while "Queued" in (status := study.run("dvc", "queue", "status")) or "Running" in status:
         assert time.monotonic() < deadline, status
-        time.sleep(2)
+        time.sleep(5)
     assert status.count("Success") == 3, status
     told = json.loads(study.run("anyview", "sweep", "imitation.reward.phi", "--json"))
     found = {trial["value"]: trial["experiment"] for trial in told["trials"]}

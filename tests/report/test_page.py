@@ -111,7 +111,9 @@ def test_figures_are_files_of_their_own_too(whole):
 
 def test_plots_hold_every_cell_and_stay_short(whole):
     table = pd.read_csv(whole / "metrics/plots/final_distance.csv")
-    assert list(table.columns) == ["cell", "iteration", "final_distance"]
+    assert list(table.columns) == ["cell", "iteration", "final_distance", "low", "high"]
+    assert (table["low"] <= table["final_distance"]).all()
+    assert (table["final_distance"] <= table["high"]).all()
     assert {"ours", "oracle", "gail"} <= set(table["cell"])
     assert table.groupby("cell").size().max() <= 101
     assert (whole / "metrics/plots/strips/sim.png").exists()

@@ -23,15 +23,17 @@ _POINTS = 100
 
 def write_plots(folder: Path, study: Study) -> None:
     """Write every table and picture that ``study`` allows into ``folder``."""
-    losses = {cell: training.losses("validation_loss") for cell, training in study.trainings.items()}
-    distances = {
-        cell: study.evaluations[cell].curve.groupby("iteration")["final_distance"].median()
-        for cell in in_order(study.evaluations)
+    losses = {
+        cell: training.curve[["iteration", "validation_loss"]] for cell, training in study.trainings.items()
     }
-    weights = {cell: pd.Series(entry.feature_weights) for cell, entry in study.translations.items()}
-    _write(folder / "validation_loss.csv", _curves(losses, "iteration", "validation_loss"))
-    _write(folder / "final_distance.csv", _curves(distances, "iteration", "final_distance"))
-    _write(folder / "feature_weights.csv", _curves(weights, "frame", "weight"))
+    distances = {cell: _quartiles(study.evaluations[cell].curve) for cell in in_order(study.evaluations)}
+    weights = {
+        cell: pd.Series(entry.feature_weights, name="weight").rename_axis("frame").reset_index()
+        for cell, entry in study.translations.items()
+    }
+    _write(folder / "validation_loss.csv", _curves(losses))
+    _write(folder / "final_distance.csv", _curves(distances))
+    _write(folder / "feature_weights.csv", _curves(weights))
     _write(folder / "success.csv", _success(study))
     _write(folder / "differences.csv", _differences(study))
     for cell, translation in study.translations.items():
@@ -42,13 +44,20 @@ def write_plots(folder: Path, study: Study) -> None:
         write_atomically(folder / "idea.png", to_png(strip(idea)))
 
 
-def _curves(curves: dict[str, pd.Series], x: str, y: str) -> pd.DataFrame:
-    """Columns ``cell``, ``x``, ``y``; each curve thinned to at most ``_POINTS`` points and its last."""
+def _quartiles(curve: pd.DataFrame) -> pd.DataFrame:
+    """Columns ``iteration``, ``final_distance`` (median over runs), ``low`` and ``high`` (quartiles)."""
+    quartiles = curve.groupby("iteration")["final_distance"].quantile([0.5, 0.25, 0.75]).unstack()
+    return quartiles.set_axis(["final_distance", "low", "high"], axis=1).reset_index()
+
+
+def _curves(curves: dict[str, pd.DataFrame]) -> pd.DataFrame:
+    """``cell`` and the curves' own columns; each curve thinned to at most ``_POINTS`` points and its last."""
     parts = []
     for cell, curve in curves.items():
         kept = sorted({*range(0, len(curve), -(-len(curve) // _POINTS)), len(curve) - 1})
-        thin = curve.iloc[kept].rename_axis(x).rename(y).reset_index()
-        parts.append(thin.assign(cell=cell)[["cell", x, y]])
+        thin = curve.iloc[kept].copy()
+        thin.insert(0, "cell", cell)
+        parts.append(thin)
     return pd.concat(parts) if parts else pd.DataFrame()
 
 
