@@ -21,7 +21,9 @@ DOCUMENTS = sorted(
         ["git", "ls-files", "*.md"], cwd=ROOT, capture_output=True, text=True, check=True
     ).stdout.split()
 )
-OTHERS = {"git", "cd", "source", ".", "open", "pre-commit", "python", "echo", "ls", "docker", "ray", "pip"}
+OTHERS = set(
+    ". apt-get cd docker echo export git ls pip pre-commit python ray source ssh sudo xdg-open".split()
+)
 """Programs that are not ours: the documents may call them, nothing else."""
 
 each_document = pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
@@ -87,6 +89,19 @@ def test_keys_of_params_exist(path):
     assert {name for name in named if "<" not in name} - keys - blocks - unknown == set()
 
 
+def test_every_benchmark_says_how_its_numbers_are_taken():
+    table = (ROOT / "benchmarks" / "README.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `(benchmarks/\w+\.py)` \|.*\|.{20,}\|$", table, re.M)
+    assert sorted(rows) == sorted(f"benchmarks/{path.name}" for path in (ROOT / "benchmarks").glob("*.py"))
+
+
+def test_the_map_of_the_code_names_every_package():
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    for folder in (ROOT / "src" / "anyview").iterdir():
+        if (folder / "__init__.py").is_file():
+            assert f"| `src/anyview/{folder.name}/` |" in text, folder.name
+
+
 def commands() -> Iterator[tuple[str, str]]:
     """Every line of the documents' shell blocks, and every `command` of ours in their text."""
     for path in DOCUMENTS:
@@ -106,6 +121,8 @@ def test_commands_are_understood(name, line):
     """By the parsers of the programs themselves: no such command, option or target would pass."""
     for part in re.split(r"&&|;| \| ", re.sub(r"(^|\s)#.*", "", line)):
         words = [word for word in shlex.split(part.split(" > ")[0]) if word != "..."]
+        while words and re.match(r"[A-Z_]+=", words[0]):
+            words.pop(0)
         if not words:
             continue
         program, arguments = words[0].removeprefix(".venv/bin/"), words[1:]
