@@ -1,13 +1,14 @@
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from anyview.runtime.errors import AnyviewError
 from anyview.runtime.workers import run_units
 
 sys.path.insert(0, str(Path(__file__).parent))
-from units import die, draw, queue, refuse
+from units import die, draw, mark, queue, refuse
 
 UNITS = [(number,) for number in range(5)]
 
@@ -29,6 +30,11 @@ def test_results_come_as_they_are_ready(workers, tmp_path):
     assert next(results) == 0
     gate.touch()
     assert list(results) == [1, 2, 3]
+
+
+def test_a_unit_may_write_to_a_large_array_of_its_own(workers):
+    units = [(np.zeros(200_000), number) for number in (1, 2)]
+    assert list(run_units(mark, units)) == [1, 2]
 
 
 def test_a_user_error_in_a_worker_is_the_users(workers):

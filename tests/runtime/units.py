@@ -40,3 +40,9 @@ def die(number: int) -> int:
     if number == 1:
         os.kill(os.getpid(), 9)
     return number
+
+
+def mark(values: np.ndarray, number: int) -> int:
+    """Write into a large array, which is the unit's own."""
+    values[0] = number
+    return int(values.sum())

@@ -48,6 +48,7 @@ def _run_locally(function: Callable[..., T], units: Sequence[tuple[Any, ...]]) -
             min(worker_count(), len(units)),
             return_as="generator",
             batch_size=1,
+            mmap_mode="c",  # a large array is mapped, and a unit may still write to its own
             initializer=_begin_worker,
             initargs=(os.getpid(),),
         )
