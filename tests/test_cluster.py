@@ -91,6 +91,7 @@ def test_another_clone_can_use_the_run_cache(smoke, tmp_path):
 @pytest.fixture
 def bucket(monkeypatch) -> Iterator[tuple[str, str]]:
     """A bucket of an S3-compatible server on this machine: (its URL, the server's address)."""
+    pytest.importorskip("dvc_s3")
     server = pytest.importorskip("moto.server").ThreadedMotoServer("127.0.0.1", port=0, verbose=False)
     for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
         monkeypatch.setenv(name, "test")

@@ -87,7 +87,7 @@ def test_running_out_of_room_keeps_the_old_file(tmp_path):
         [sys.executable, "-c", script, str(path)], preexec_fn=limit, capture_output=True, text=True
     )
     assert done.returncode == 2
-    assert done.stderr == "error: File too large\n"
+    assert done.stderr == f"error: {path}: File too large\n"
     assert path.read_text() == "old"
     assert names(tmp_path) == ["table.csv"]
 
