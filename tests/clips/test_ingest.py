@@ -4,6 +4,7 @@ import os
 import re
 import resource
 import shutil
+import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -75,6 +76,32 @@ def test_frames_are_resampled_by_the_sidecar_and_not_by_the_header(tmp_path):
     for k in (0, 10, 33, 79):
         chosen = np.argmin(np.abs(clip[k] - small).mean(axis=(1, 2, 3)))
         assert abs(times[chosen] - k / 10) <= 0.051
+
+
+@pytest.mark.parametrize("name", ["clip.mp4", "clip.mov"])
+def test_a_clip_that_was_trimmed_without_being_written_anew_is_no_damaged_one(tmp_path, name):
+    path = write_raw(tmp_path / name, pictures(300), 30.0, "mp4v")
+    content = bytearray(path.read_bytes())
+    entry = content.index(b"elst") + 12  # the edit list's only entry: milliseconds to show, where to begin
+    length, begin = struct.unpack_from(">Ii", content, entry)
+    assert (length, begin) == (10_000, 0)
+    scale = struct.unpack_from(">I", content, content.index(b"mdhd") + 16)[0]
+    struct.pack_into(">Ii", content, entry, 8300, round(1.5 * scale))
+    path.write_bytes(content)
+    clip = read_clip(path, LIMITS)
+    for k in (0, 40, 79):
+        assert np.abs(clip[k] - shrunk(pictures(300)[round(30 * (1.5 + k / 10))])).mean() < 6
+    struct.pack_into(">I", content, entry - 4, 10**9)
+    path.write_bytes(content)
+    with pytest.raises(Refused, match="damaged: altered"):
+        read_clip(path, LIMITS)
+
+
+def test_a_codec_that_is_unknown_here_is_not_only_called_damage(tmp_path):
+    path = write_raw(tmp_path / "clip.avi", pictures())
+    path.write_bytes(path.read_bytes().replace(b"XVID", b"AV01"))
+    with pytest.raises(Refused, match="codec that is unknown here: no frame"):
+        read_clip(path, LIMITS)
 
 
 REFUSALS = {

@@ -18,17 +18,22 @@ class Damaged(Exception):
     """What is wrong with a file, in a few words."""
 
 
-def check_container(path: Path) -> None:
-    """Raise ``Damaged`` when the file's parts do not add up to the file, or claim an impossible picture."""
+def check_container(path: Path) -> float:
+    """Raise ``Damaged`` when the file's parts do not add up to the file, or claim an impossible picture.
+
+    Returns the share of its frames that the file says to show: below 1 where it was trimmed without being
+    written anew.
+    """
     size = path.stat().st_size
     with path.open("rb") as handle:
         start = handle.read(12)
         if start[:4] == b"RIFF" and start[8:] == b"AVI ":
             _Avi(handle, size).check()
         elif start[4:8] in (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip"):
-            _Mp4(handle, size).check()
+            return _Mp4(handle, size).check()
         elif start[:4] == b"\x1a\x45\xdf\xa3":
             _Matroska(handle, size).check()
+    return 1.0
 
 
 class _Container:
@@ -127,9 +132,11 @@ class _Avi(_Container):
 class _Mp4(_Container):
     """Boxes tile the file; every sample lies inside it."""
 
-    _PARENTS = (b"moov", b"trak", b"mdia", b"minf", b"stbl")
+    _PARENTS = (b"moov", b"trak", b"edts", b"mdia", b"minf", b"stbl")
 
-    def check(self) -> None:
+    def check(self) -> float:
+        """The share of a track's length that its edit list shows, the least of all tracks."""
+        self._clock, self._shown = 0, 1.0
         kinds = set()
         for kind, start, stop in self._boxes(0, self._size):
             kinds.add(kind)
@@ -137,6 +144,7 @@ class _Mp4(_Container):
                 self._movie(start, stop)
         if b"moov" not in kinds or not kinds & {b"mdat", b"moof"}:
             raise Damaged("no index of its frames, or no frames: cut short")
+        return self._shown
 
     def _boxes(self, offset: int, end: int) -> Iterator[tuple[bytes, int, int]]:
         """(type, start, stop) of the contents of the boxes between ``offset`` and ``end``."""
@@ -156,8 +164,19 @@ class _Mp4(_Container):
     def _movie(self, offset: int, end: int) -> None:
         samples = 0
         for kind, start, stop in self._boxes(offset, end):
+            if kind == b"trak":
+                self._length = self._edited = 0.0
             if kind in self._PARENTS:
                 self._movie(start, stop)
+            if kind == b"trak" and self._length and self._edited:
+                self._shown = min(self._shown, self._edited / self._length)
+            elif kind == b"mvhd":
+                self._clock, _ = self._duration(start)
+            elif kind == b"mdhd":
+                scale, length = self._duration(start)
+                self._length = length / max(scale, 1)
+            elif kind == b"elst":
+                self._edited = self._segments(start, stop) / max(self._clock, 1)
             elif kind == b"tkhd":
                 width, height = (side >> 16 for side in struct.unpack(">II", self.read(stop - 8, 8)))
                 if width * height > MAX_PIXELS:
@@ -180,6 +199,22 @@ class _Mp4(_Container):
                 offsets = struct.unpack(f">{entries}{'I' if width == 4 else 'Q'}", content)
                 if offsets and max(offsets) >= self._size:
                     raise Damaged("claims frames beyond its end")
+
+    def _duration(self, offset: int) -> tuple[int, int]:
+        """(time units in a second, duration in units) of a movie or media header."""
+        long = self.read(offset, 1)[0] == 1
+        if long:
+            return struct.unpack(">IQ", self.read(offset + 20, 12))
+        return struct.unpack(">II", self.read(offset + 12, 8))
+
+    def _segments(self, offset: int, end: int) -> int:
+        """Movie time units that an edit list shows; pauses, whose media time is -1, do not count."""
+        entry = struct.Struct(">QqI" if self.read(offset, 1)[0] == 1 else ">IiI")
+        count = struct.unpack(">I", self.read(offset + 4, 4))[0]
+        if count * entry.size > end - offset - 8:
+            raise Damaged("altered")
+        entries = entry.iter_unpack(self.read(offset + 8, count * entry.size))
+        return sum(length for length, begin, _ in entries if begin >= 0)
 
 
 class _Matroska(_Container):

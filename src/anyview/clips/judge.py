@@ -35,8 +35,8 @@ def read_clip(path: Path, limits: Ingest) -> np.ndarray:
     a gap, the frame before the gap stands again.
     """
     try:
-        check_container(path)
-        frames = _decode(path, _sidecar_times(path), limits)
+        shown = check_container(path)
+        frames = _decode(path, _sidecar_times(path), shown, limits)
     except Damaged as damage:
         raise Refused(f"damaged: {damage}") from None
     except AnyviewError as error:
@@ -61,7 +61,7 @@ def _sidecar_times(path: Path) -> np.ndarray | None:
     return times
 
 
-def _decode(path: Path, sidecar: np.ndarray | None, limits: Ingest) -> np.ndarray:
+def _decode(path: Path, sidecar: np.ndarray | None, shown: float, limits: Ingest) -> np.ndarray:
     frames = np.empty((limits.frames, limits.size, limits.size, 3), np.uint8)
     filled = used = decoded = 0
     time = 0.0
@@ -76,8 +76,10 @@ def _decode(path: Path, sidecar: np.ndarray | None, limits: Ingest) -> np.ndarra
             if filled < limits.frames and time >= filled / limits.rate - 0.75 * period:
                 frames[filled] = _shrink(capture.retrieve()[1], limits.size)
                 filled, used = filled + 1, used + 1
-        declared = capture.get(cv2.CAP_PROP_FRAME_COUNT)
+        declared = shown * capture.get(cv2.CAP_PROP_FRAME_COUNT)
         damage = messages.damage()
+    if not decoded:
+        raise Refused(f"damaged, or of a codec that is unknown here: {damage or 'no frame can be decoded'}")
     if damage or decoded < max(declared - max(2.0, 0.02 * declared), 1):
         raise Refused(f"damaged: {damage or f'{decoded} of {declared:.0f} frames can be decoded'}")
     if filled < limits.frames:
