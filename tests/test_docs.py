@@ -22,7 +22,24 @@ DOCUMENTS = sorted(
     ).stdout.split()
 )
 OTHERS = set(
-    ". apt-get cd docker echo export git ls pip pre-commit python ray source ssh sudo xdg-open".split()
+    [
+        ".",
+        "apt-get",
+        "cd",
+        "docker",
+        "echo",
+        "export",
+        "git",
+        "ls",
+        "pip",
+        "pre-commit",
+        "python",
+        "ray",
+        "source",
+        "ssh",
+        "sudo",
+        "xdg-open",
+    ]
 )
 """Programs that are not ours: the documents may call them, nothing else."""
 
