@@ -97,7 +97,7 @@ def main(arguments: list[str]) -> None:
     manifest = pd.DataFrame([row for record in records for row in record["rows"]])
     with whole_folder(Path("data/sim") / kind) as output:
         for record in records:
-            shutil.move(folder / record["file"]["file"], output)
+            shutil.copyfile(folder / record["file"]["file"], output / record["file"]["file"])
         write_set(output, manifest, [StoredFile(**record["file"]) for record in records])
         summary = {
             "demos": len(manifest),
@@ -105,6 +105,7 @@ def main(arguments: list[str]) -> None:
             "acceptance": float(np.mean([record["acceptance"] for record in records])),
         }
         write_atomically(output / "summary.json", json.dumps(summary, indent=1) + "\n")
+    shutil.rmtree(folder)
 
 
 if __name__ == "__main__":

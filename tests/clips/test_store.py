@@ -1,5 +1,7 @@
 """Video files and decoded sets: lossless, whole, and clear about damage."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -113,6 +115,42 @@ def test_an_impossible_table_is_named(tmp_path, table, content):
     (tmp_path / "set" / table).write_bytes(content.encode("latin-1"))
     with pytest.raises(AnyviewError, match=r"(manifest|files)\.csv"):
         open_frames(tmp_path / "set")
+
+
+WRITE_UNDER_LIMITS = """
+import resource, signal, sys
+from pathlib import Path
+import numpy as np
+from anyview.clips.video import write_video
+from anyview.runtime.errors import AnyviewError
+
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+whole, path, codec = Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3]
+frames = np.random.default_rng(0).integers(0, 256, (20, 12, 12, 3), np.uint8).repeat(4, 1).repeat(4, 2)
+write_video(whole, frames, 10.0, codec)
+size = whole.stat().st_size
+refused = 0
+for limit in [*range(1000, size, size // 20), size - 1]:
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
+    try:
+        write_video(path, frames, 10.0, codec)
+    except AnyviewError:
+        refused += 1
+        assert not path.exists()
+    else:  # FFmpeg's buffer may have taken less room for a moment
+        assert path.read_bytes() == whole.read_bytes(), f"cut short at {limit} of {size} bytes"
+print(refused)
+"""
+
+
+@pytest.mark.parametrize("codec", ["XVID", "FFV1"])
+def test_a_full_disk_at_any_byte_leaves_no_half_video(tmp_path, codec):
+    """A file size limit stands for a full disk: a write stores half of what it was given."""
+    command = [sys.executable, "-c", WRITE_UNDER_LIMITS, tmp_path / "whole.avi", tmp_path / "clip.avi", codec]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout) >= 20
+    assert [path.name for path in tmp_path.iterdir()] == ["whole.avi"]
 
 
 def test_a_write_that_fails_leaves_nothing(tmp_path):

@@ -43,7 +43,7 @@ def test_shared_weights_are_stored_once_and_stay_shared(saved):
 
 
 @pytest.mark.parametrize("name", ["weights.safetensors", "model.json"])
-@pytest.mark.parametrize("content", [None, b"", b"\x80\x04.", b"{}", b"[1]"])
+@pytest.mark.parametrize("content", [None, b"", b"\x80\x04.", b"{}", b"[1]", b'{"a":' * 100_000])
 def test_broken_files_are_named(saved, name, content):
     folder, _ = saved
     if content is None:
@@ -60,4 +60,22 @@ def test_weights_of_another_model_are_refused(saved):
     meta["architecture"] = "compact" if model.architecture == "real" else "real"
     (folder / "model.json").write_text(json.dumps(meta))
     with pytest.raises(AnyviewError, match="does not hold the weights"):
+        load_translator(folder)
+
+
+@pytest.mark.parametrize("size", [10**9, 16_000, 0, -16, 16.0, "16", None])
+def test_an_impossible_size_is_refused_before_it_takes_memory(saved, size):
+    folder, _ = saved
+    meta = json.loads((folder / "model.json").read_text())
+    (folder / "model.json").write_text(json.dumps(meta | {"image_size": size}))
+    with pytest.raises(AnyviewError, match=r"model\.json: image_size must be a whole number from 1 to 256"):
+        load_translator(folder)
+
+
+@pytest.mark.parametrize("architecture", [None, 7, [], {}, "../real"])
+def test_an_impossible_architecture_is_refused(saved, architecture):
+    folder, _ = saved
+    meta = json.loads((folder / "model.json").read_text())
+    (folder / "model.json").write_text(json.dumps(meta | {"architecture": architecture}))
+    with pytest.raises(AnyviewError, match="architecture"):
         load_translator(folder)

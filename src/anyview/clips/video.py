@@ -101,13 +101,18 @@ class VideoWriter:
                 # OpenCV reports no failed write, so that a full disk shows only in what can be read back.
                 with open_capture(self._partial) as (capture, _):
                     stored = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
-                if stored != self._written:
-                    raise AnyviewError(
-                        f"{self._path}: {stored} of {self._written} frames were stored; disk full?"
-                    )
+                if stored != self._written or _lacks_bytes(self._partial):
+                    raise AnyviewError(f"{self._path}: {self._written} frames were not stored; disk full?")
                 os.replace(self._partial, self._path)
         finally:
             self._partial.unlink(missing_ok=True)
+
+
+def _lacks_bytes(path: Path) -> bool:
+    """Whether an AVI is shorter than its header says: FFmpeg takes half a write for a whole one."""
+    with path.open("rb") as file:
+        start = file.read(8)
+    return start[:4] == b"RIFF" and path.stat().st_size < 8 + int.from_bytes(start[4:], "little")
 
 
 def write_video(path: Path, frames: np.ndarray, fps: float, codec: Codec = "FFV1") -> None:

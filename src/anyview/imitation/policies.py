@@ -97,7 +97,10 @@ def load_policy(folder: Path, run: int) -> Policy:
         raise AnyviewError(f"{path}: not a safetensors file: {error}") from None
     if not _fits(weights):
         raise AnyviewError(f"{path}: does not hold the weights of a policy; run the cell again")
-    context = Context.from_json(json.dumps(description["contexts"][run]))
+    try:
+        context = Context.from_json(json.dumps(description["contexts"][run]))
+    except (KeyError, TypeError):
+        raise AnyviewError(f"{folder / _DESCRIPTION}: the context of run {run} is damaged") from None
     return Policy(description["learner"], description["control"], description["image_size"], context, weights)
 
 
@@ -108,7 +111,7 @@ def _read_description(path: Path) -> dict[str, Any]:
         raise AnyviewError(
             f"{path}: no such file; run `dvc repro imitate@{path.parent.name}` first"
         ) from None
-    except (ValueError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise AnyviewError(f"{path}: not valid JSON: {error}") from None
     keys = {"learner": str, "control": str, "image_size": int, "contexts": list}
     if not isinstance(values, dict) or any(not isinstance(values.get(k), kind) for k, kind in keys.items()):

@@ -38,6 +38,7 @@ _TIMES = 10  # of a clip in a batch; each is compared with every other
 _THREADS = 2  # fixed: reductions are split by it, so the weights do not depend on the machine
 _WEIGHTS = "weights.safetensors"
 _MODEL = "model.json"
+_LARGEST = 1024  # pixels and dimensions: a file that asks for more is damaged, and would take all the memory
 
 
 class Embedding(nn.Module):
@@ -264,9 +265,11 @@ def _read_meta(path: Path) -> dict[str, Any]:
         meta = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise AnyviewError(f"{path}: no such file; train the cell first") from None
-    except (ValueError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise AnyviewError(f"{path}: not valid JSON: {error}") from None
     sizes = [meta.get(key) if isinstance(meta, dict) else None for key in ("image_size", "dimensions")]
-    if not all(isinstance(size, int) and size > 0 for size in sizes):
-        raise AnyviewError(f"{path}: no embedding: image_size and dimensions must be whole numbers above 0")
+    if not all(isinstance(size, int) and 0 < size <= _LARGEST for size in sizes):
+        raise AnyviewError(
+            f"{path}: no embedding: image_size and dimensions must be whole numbers from 1 to {_LARGEST}"
+        )
     return meta

@@ -14,6 +14,7 @@ from anyview.translation.network import ContextTranslator
 
 _WEIGHTS = "weights.safetensors"
 _MODEL = "model.json"
+_LARGEST = 256  # pixels: a file that asks for more is damaged, and would take all the memory
 
 
 def stored_state(model: ContextTranslator) -> dict[str, torch.Tensor]:
@@ -49,17 +50,20 @@ def read_meta(folder: Path) -> dict[str, Any]:
         raise AnyviewError(
             f"{path}: no such file; train the cell first, or name a folder that holds a model"
         ) from None
-    except (ValueError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise AnyviewError(f"{path}: not valid JSON: {error}") from None
-    if not isinstance(meta, dict) or not isinstance(meta.get("image_size"), int):
-        raise AnyviewError(f"{path}: no translator: keys architecture and image_size are missing")
+    if not isinstance(meta, dict) or not isinstance(meta.get("architecture"), str):
+        raise AnyviewError(f"{path}: no translator: the key architecture is missing")
+    size = meta.get("image_size")
+    if not isinstance(size, int) or not 0 < size <= _LARGEST:
+        raise AnyviewError(f"{path}: image_size must be a whole number from 1 to {_LARGEST}")
     return meta
 
 
 def load_translator(folder: Path) -> ContextTranslator:
     """The saved translator, float32 on the CPU, in evaluation mode with no gradients."""
     meta = read_meta(folder)
-    model = ContextTranslator(meta.get("architecture", ""), meta["image_size"])
+    model = ContextTranslator(meta["architecture"], meta["image_size"])
     path = folder / _WEIGHTS
     try:
         restore_state(model, load(path.read_bytes()))
