@@ -6,7 +6,9 @@ yields nothing before the last unit is done. Ray's plain tasks do both.
 
 import logging
 import os
+import re
 import signal
+import socket
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -22,6 +24,7 @@ from anyview.runtime.parent import end_with_parent
 T = TypeVar("T")
 
 _RETRIES = 3
+_PATIENCE = 10  # seconds for a cluster's address to answer
 
 
 def run_units(function: Callable[..., T], units: Sequence[tuple[Any, ...]]) -> Iterator[T]:
@@ -109,7 +112,10 @@ def _connect() -> Any:
         address = os.environ.get("RAY_ADDRESS")
         own: dict[str, Any] = {} if address else {"include_dashboard": False, "num_cpus": worker_count()}
         try:
+            if address and (place := re.fullmatch(r"([\w.-]+):(\d{1,5})", address)):
+                # Ray itself waits for minutes for a cluster that is not there.
+                socket.create_connection((place[1], int(place[2])), timeout=_PATIENCE).close()
             ray.init(address, log_to_driver=False, logging_level=logging.ERROR, **own)
-        except (ConnectionError, ValueError) as error:
+        except (OSError, OverflowError, ValueError) as error:
             raise AnyviewError(f"RAY_ADDRESS={address}: {error}") from None
     return ray
