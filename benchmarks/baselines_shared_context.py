@@ -15,8 +15,8 @@ import torch
 
 from anyview.config import Params, load_params
 from anyview.imitation.discriminators import ClipSet, LearnedReward
+from anyview.imitation.evaluation import explore
 from anyview.imitation.gail import gail_reward
-from anyview.imitation.interfaces import Arrays
 from anyview.imitation.statistics import bootstrap_interval
 from anyview.imitation.tpil import random_motion, tpil_reward
 from anyview.imitation.trpo import TRPO
@@ -43,21 +43,6 @@ def make_reward(method: str, params: Params, contexts: list[Context], clips: np.
     return tpil_reward(
         imitation.discriminator, seed, runs, experts, bystanders, imitation.trpo.batch_episodes
     )
-
-
-def explore(pushers: PusherBatch, learner: TRPO, reward: LearnedReward, copies: int) -> Arrays:
-    """A batch of ``copies`` episodes in each context; the discriminators' measures."""
-    shape = (pushers.count // copies, copies)
-    observations = pushers.reset().reshape(*shape, -1)
-    for step in range(1, ACTIONS + 1):
-        actions = learner.act(observations, explore=True)
-        following = pushers.step(actions.reshape(pushers.count, -1)).reshape(*shape, -1)
-        frames = pushers.render()
-        rewards = reward.step(frames.reshape(*shape, *frames.shape[1:]), step)
-        learner.record(observations, actions, rewards, following, step)
-        observations = following
-    learner.end_iteration()
-    return reward.end_iteration()
 
 
 def perform(pushers: PusherBatch, learner: TRPO, expert: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -91,7 +76,9 @@ def shared_context(method: str, episodes: int) -> None:
     print(f"{'episodes':>10}{'from expert':>14}{'final distance':>16}  accuracies")
     print(f"{0:10}{np.median(before[0]):14.3f}{np.median(before[1]):16.3f}")
     for batch in range(1, batches + 1):
-        measures = explore(acting, learner, reward, copies)
+        explore(acting, learner, reward, RUNS)
+        learner.end_iteration()
+        measures = reward.end_iteration()
         if batch in shown:
             after = perform(testing, learner, expert)
             told = ", ".join(f"{name.split('_')[0]} {value.mean():.2f}" for name, value in measures.items())

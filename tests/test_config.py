@@ -84,6 +84,16 @@ def test_the_committed_params_are_sound():
         ("sim", None, "sim: Input should be a valid dictionary"),
         ("split.sim.validation", 0.0, "split.sim.validation: Input should be greater than 0, got 0.0"),
         ("real.ingest.rate", math.inf, "real.ingest.rate: Input should be a finite number, got inf"),
+        (
+            "imitation.cells.tpil.learner",
+            "ddpg",
+            "imitation.cells.tpil.reward: learns from the batches of trpo, not of ddpg, got 'tpil'",
+        ),
+        (
+            "imitation.cells.no-image-reward.reads",
+            "reward",
+            "imitation.cells.no-image-reward.reads: must be 'reward.time_power' for this reward",
+        ),
         ("real.ingest.frames", 10**6, "real.ingest.frames: Input should be less than or equal to 10000"),
     ],
 )

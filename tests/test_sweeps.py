@@ -7,6 +7,7 @@ import pytest
 
 from anyview.config import read_yaml
 from tests.conftest import Study
+from tests.long_stages import change
 
 pytestmark = pytest.mark.slow
 
@@ -24,10 +25,10 @@ def study(smoke, tmp_path_factory) -> Study:
     return copy
 
 
-def cells(study: Study, source: str = "") -> set[str]:
-    """Stages of the imitation cells that read ``source``."""
+def cells(study: Study, **keys: str) -> set[str]:
+    """Stages of the imitation cells that have these keys in params.yaml."""
     found = read_yaml(study.folder / "params.yaml")["imitation"]["cells"]
-    return {f"imitate@{name}" for name, cell in found.items() if cell["source"].startswith(source)}
+    return {f"imitate@{name}" for name, cell in found.items() if keys.items() <= cell.items()}
 
 
 def reran(study: Study) -> set[str]:
@@ -39,17 +40,20 @@ def reran(study: Study) -> set[str]:
     return {change["name"] for change in review["stages"]}
 
 
-def test_phi_reruns_no_data_and_no_translator(study):
+@pytest.mark.parametrize(
+    ("key", "value", "reads", "count"),
+    [("imitation.reward.phi", 7.0, "reward", 9), ("imitation.discriminator.steps", 7, "discriminator", 2)],
+)
+def test_a_number_of_a_reward_reruns_the_cells_that_read_it(study, key, value, reads, count):
     """By `--dry`, which names the stages without running them."""
     path = study.folder / "params.yaml"
     before = path.read_text()
-    path.write_text(before.replace("phi: ", "phi: 7"))
+    change(study.folder, {key: value})
     said = study.run("dvc", "repro", "--dry").splitlines()
     path.write_text(before)
-    assert {line.split("'")[1] for line in said if line.startswith("Running stage")} == {
-        *cells(study),
-        "report",
-    }
+    expected = cells(study, reads=reads)
+    assert len(expected) == count
+    assert {line.split("'")[1] for line in said if line.startswith("Running stage")} == {*expected, "report"}
 
 
 def test_a_weight_of_a_loss_reruns_its_translator_and_what_follows(study):
@@ -58,7 +62,7 @@ def test_a_weight_of_a_loss_reruns_its_translator_and_what_follows(study):
     assert reran(study) == {
         "train@sim-no-alignment",
         "translate@sim-no-alignment",
-        *cells(study, "data/models/sim-no-alignment"),
+        *cells(study, source="data/models/sim-no-alignment"),
         "report",
     }
     metric = "translation.sim-no-alignment.validation.translation"

@@ -10,6 +10,7 @@ from pydantic import (
     ConfigDict,
     Field,
     ValidationError,
+    ValidationInfo,
     field_validator,
     model_validator,
 )
@@ -248,6 +249,9 @@ class Discriminator(Block):
     domain_weight: NonNegative = Field(description="gradient reversal of TPIL's domain head")
 
 
+_LEARNED = ("gail", "tpil")  # rewards that train on what the agent does
+
+
 class ImitationCell(Block):
     """One method to evaluate."""
 
@@ -258,6 +262,27 @@ class ImitationCell(Block):
     )
     feature: bool = Field(description="use the feature reward L_f")
     image: bool = Field(description="use the image reward L_i")
+    reads: Literal["reward", "reward.time_power", "discriminator"] = Field(
+        description="the part of `imitation` that the reward reads: the cell is run again when it changes"
+    )
+
+    @field_validator("reward")
+    @classmethod
+    def _has_batches(cls, reward: str, info: ValidationInfo) -> str:
+        learner = info.data.get("learner")
+        if reward in _LEARNED and learner not in ("trpo", None):
+            raise ValueError(f"learns from the batches of trpo, not of {learner}")
+        return reward
+
+    @field_validator("reads")
+    @classmethod
+    def _reads_what_the_reward_does(cls, reads: str, info: ValidationInfo) -> str:
+        reward, both = info.data.get("reward"), info.data.get("feature") and info.data.get("image")
+        weighed = reward in ("translated", "true") and both
+        expected = "discriminator" if reward in _LEARNED else "reward" if weighed else "reward.time_power"
+        if info.data.keys() >= {"reward", "feature", "image"} and reads != expected:
+            raise ValueError(f"must be {expected!r} for this reward")
+        return reads
 
     @model_validator(mode="after")
     def _some_reward(self) -> "ImitationCell":

@@ -143,10 +143,11 @@ def _shrink(picture: np.ndarray, size: int) -> np.ndarray:
 
 def _check_content(frames: np.ndarray, rate: float) -> None:
     """Refuse pictures that show nothing, no colour or no motion."""
-    grey = frames.mean(axis=-1, dtype=np.float32)
+    red, green, blue = (frames[..., channel] for channel in range(3))
+    grey = (red.astype(np.float32) + green + blue) / 3
     if (grey.std(axis=(1, 2)) < MIN_CONTRAST).mean() > 0.05:
         raise Refused("black or of one colour")
-    spread = frames.max(axis=-1) - frames.min(axis=-1)
+    spread = np.maximum(np.maximum(red, green), blue) - np.minimum(np.minimum(red, green), blue)
     if np.percentile(spread, 99) < MIN_COLOUR:
         raise Refused("without colour")
     if np.abs(grey - grey[0]).mean(axis=(1, 2)).max() < MIN_MOTION:

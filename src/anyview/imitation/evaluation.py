@@ -106,7 +106,7 @@ def _train(
         scoring.reward.restore(_part(arrays, "reward."))
     with track(label, params.iterations, start) as progress:
         for iteration in range(start + 1, params.iterations + 1):
-            earned = _explore(acting, learner, scoring.reward, len(group.runs))
+            earned = explore(acting, learner, scoring.reward, len(group.runs))
             learner.end_iteration()
             since.append({"return": earned * scoring.units, **scoring.reward.end_iteration()})
             note = ""
@@ -134,7 +134,7 @@ def _train(
     return pd.DataFrame(rows)
 
 
-def _explore(batch: PusherBatch, learner: Learner, reward: RewardSource, runs: int) -> np.ndarray:
+def explore(batch: PusherBatch, learner: Learner, reward: RewardSource, runs: int) -> np.ndarray:
     """One iteration's episodes: physics, then one pass of rendering and one batch of encoding a step.
 
     Returns what they earned (R,), the mean over a run's copies.

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import joblib
+import numpy as np
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from anyview.runtime.device import worker_count
@@ -96,7 +97,8 @@ def _ray_unit(
         raise AnyviewError(f"{folder}: a Ray node does not see it; keep the repository on shared storage")
     os.chdir(folder)
     os.environ.update(environment)
-    return function(*unit)
+    # Ray shares arrays read-only; a unit may write to its own, as it may in a local process.
+    return function(*(np.array(value) if isinstance(value, np.ndarray) else value for value in unit))
 
 
 def _connect() -> Any:

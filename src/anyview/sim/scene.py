@@ -114,7 +114,7 @@ def model(control: str) -> mujoco.MjModel:
   <option timestep="{CONTROL_SECONDS / SUBSTEPS}" integrator="implicitfast" gravity="0 0 0"/>
   <visual>
     <global fovy="{CAMERA_FOVY}"/>
-    <quality shadowsize="0" offsamples="0" numslices="16" numstacks="4" numquads="1"/>
+    <quality shadowsize="0" offsamples="0" numslices="16" numstacks="2" numquads="1"/>
     <headlight ambient="0.55 0.55 0.55" diffuse="0.2 0.2 0.2" specular="0 0 0"/>
   </visual>
   <worldbody>

@@ -6,7 +6,7 @@ T(z1, z2) -> z3, and Dec(z3, skips of Enc2(o_0^j)) is the expert's frame as the 
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 import torch
@@ -138,7 +138,40 @@ class SkipConvolution(nn.ConvTranspose2d):
 
     def _convolve(self, x: Tensor, weight: Tensor, bias: Tensor | None) -> Tensor:
         stride = self.stride[0]
+        if stride == 2 and self.out_channels == _COLOURS:
+            return cast(Tensor, _DoublingToColours.apply(x, weight.to(x.dtype), bias))
         return F.conv_transpose2d(x, weight, bias, stride, _KERNEL // 2, stride - 1)
+
+
+class _DoublingToColours(torch.autograd.Function):
+    """The fractional convolution of stride 2 that ends in colours, x (N, K, H, W) -> (N, 3, 2H, 2W).
+
+    On a processor the ordinary one is slow where few channels come out. Its even and odd rows and columns are
+    four plain 3x3 convolutions of ``x``: done as one, forward takes less than half the time. Backward is the
+    ordinary one's.
+    """
+
+    @staticmethod
+    def forward(ctx: Any, x: Tensor, weight: Tensor, bias: Tensor | None) -> Tensor:
+        ctx.save_for_backward(x, weight)
+        ctx.bias = bias is not None
+        inputs, outputs = weight.shape[:2]
+        # Output 2y + a takes input y + d by the weight at k = a + 2 - 2d: of six places, counted from the
+        # last, the one at 2(d + 1) + 1 - a.
+        taps = F.pad(weight, (0, 1, 0, 1)).flip(2, 3).view(inputs, outputs, 3, 2, 3, 2).flip(3, 5)
+        kernel = taps.permute(1, 3, 5, 0, 2, 4).reshape(4 * outputs, inputs, 3, 3)
+        parts = F.conv2d(x, kernel, None if bias is None else bias.repeat_interleave(4), padding=1)
+        return F.pixel_shuffle(parts, 2)
+
+    @staticmethod
+    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor | None, ...]:
+        x, weight = ctx.saved_tensors
+        half, one = [_KERNEL // 2] * 2, [1, 1]
+        wanted = [ctx.needs_input_grad[0], ctx.needs_input_grad[1], ctx.bias]
+        sizes = [weight.shape[1]] if ctx.bias else None
+        return torch.ops.aten.convolution_backward(
+            gradient, x, weight, sizes, [2, 2], half, one, True, one, 1, wanted
+        )
 
 
 class Decoder(nn.Module):

@@ -61,20 +61,20 @@ class Trainer:
         rng = stream(self._recipe.seed, "translator/pairs", iteration)
         pairs = training_pairs(self._dataset, rng, training.batch_size)
         parts = pairs.parts(self._parts)
-        work = [(part, iteration, index) for index, part in enumerate(parts)]
+        work = [(part, len(part) / len(pairs), iteration, index) for index, part in enumerate(parts)]
         found = list(self._pool.map(lambda unit: self._gradients(*unit), work))
-        shares = [len(part) / len(pairs) for part in parts]
         rate = learning_rate(training, iteration, self._recipe.cell.iterations)
         for group in self._optimizer.param_groups:
             group["lr"] = rate
-        for index, parameter in enumerate(self._parameters):
-            parameter.grad = _weighted_sum(parameter, [gradients[index] for _, gradients in found], shares)
+        for parameter, *gradients in zip(self._parameters, *(each for _, each in found), strict=True):
+            parameter.grad = _sum(parameter, gradients)
         self._optimizer.step()
-        return torch.stack([losses * share for (losses, _), share in zip(found, shares, strict=True)]).sum(0)
+        return torch.stack([losses for losses, _ in found]).sum(0)
 
     def _gradients(
-        self, pairs: FramePairs, iteration: int, part: int
+        self, pairs: FramePairs, share: float, iteration: int, part: int
     ) -> tuple[Tensor, tuple[Tensor | None, ...]]:
+        """What a part of a batch, the ``share`` of it, adds to the batch's losses and gradients."""
         cell, seed = self._recipe.cell, self._recipe.seed
         expert, context, target = self._frames(pairs)
         if self._augmentation is not None:
@@ -87,8 +87,8 @@ class Trainer:
         with self._autocast():
             losses = batch_losses(self.model, expert, context, target, cell.weights, noise)
         total = losses.total(cell.weights)
-        gradients = torch.autograd.grad(total, self._parameters, allow_unused=True)
-        return torch.stack((total.detach(), *losses.parts())), gradients
+        gradients = torch.autograd.grad(total * share, self._parameters, allow_unused=True)
+        return torch.stack((total.detach(), *losses.parts())) * share, gradients
 
     @torch.no_grad()
     def validate(self, iteration: int) -> Tensor:
@@ -168,13 +168,14 @@ def _laid_out_as(like: Tensor, value: Tensor) -> Tensor:
     return torch.empty_like(like).copy_(value)
 
 
-def _weighted_sum(
-    parameter: Tensor, gradients: Sequence[Tensor | None], shares: list[float]
-) -> Tensor | None:
+def _sum(parameter: Tensor, gradients: Sequence[Tensor | None]) -> Tensor | None:
     """The gradient of a batch from those of its parts; None where the loss does not reach the parameter."""
-    total: Tensor | None = None
-    for gradient, share in zip(gradients, shares, strict=True):
-        if gradient is not None:
-            part = _laid_out_as(parameter, gradient).mul_(share)
-            total = part if total is None else total.add_(part)
+    reached = [gradient for gradient in gradients if gradient is not None]
+    if not reached:
+        return None
+    total = reached[0]
+    if total.stride() != parameter.stride():
+        total = _laid_out_as(parameter, total)
+    for part in reached[1:]:
+        total.add_(part)
     return total

@@ -214,7 +214,7 @@ def _scene_xml(
   <statistic extent="1" center="0 0 0"/>
   <visual>
     <global offwidth="{size[0]}" offheight="{size[1]}"/>
-    <quality offsamples="0" shadowsize="{max(256, round(1.6 * size[0]))}"
+    <quality offsamples="4" shadowsize="{max(256, round(1.6 * size[0]))}"
       numslices="16" numstacks="10" numquads="3"/>
     <map znear="0.3" zfar="6" shadowscale="0.7"/>
     <headlight active="0"/>
