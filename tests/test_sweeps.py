@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import time
 
 import pytest
 
@@ -70,3 +71,23 @@ def test_a_weight_of_a_loss_reruns_its_translator_and_what_follows(study):
     assert [trial["value"] for trial in told["trials"]] == [0.5, 1.0]
     study.run("git", "checkout", ".")
     study.run("dvc", "checkout")
+
+
+def test_a_queue_of_one_method_and_the_report(study):
+    command = ("dvc", "exp", "run", "--queue", "-S", "imitation.reward.phi=0.01,0.1,1")
+    study.run(*command, "--single-item", "imitate@ours", "report")
+    study.run("bash", "-c", "dvc queue start > queue.log 2>&1")
+    deadline = time.monotonic() + 900
+    while "Queued" in (status := study.run("dvc", "queue", "status")) or "Running" in status:
+        assert time.monotonic() < deadline, status
+        time.sleep(5)
+    assert status.count("Success") == 3, status
+    told = json.loads(study.run("anyview", "sweep", "imitation.reward.phi", "--json"))
+    found = {trial["value"]: trial["experiment"] for trial in told["trials"]}
+    assert {0.01, 0.1, 1} <= found.keys()
+    assert (study.folder / "sweep.svg").is_file()
+    shown = study.run("dvc", "exp", "show", "--no-pager")
+    assert all(found[value] in shown for value in (0.01, 0.1))
+    study.run("dvc", "exp", "apply", found[0.01])
+    assert read_yaml(study.folder / "params.yaml")["imitation"]["reward"]["phi"] == 0.01
+    assert reran(study) == {"imitate@ours", "report"}

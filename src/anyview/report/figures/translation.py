@@ -57,7 +57,8 @@ def strip(content: Strip, title: str = "") -> Figure:
     """Frames in rows with their labels and time steps, pixels kept sharp."""
     count = len(content.steps)
     aspect = len(content.rows) / count
-    with canvas(WIDTH * aspect + 0.55) as (figure, (axis,)):
+    beside, below = 0.72, 0.62 if title else 0.4  # inches of labels
+    with canvas((WIDTH - beside) * aspect + below) as (figure, (axis,)):
         picture = np.concatenate([np.concatenate(list(frames), axis=1) for _, frames in content.rows])
         height, width = content.rows[0][1].shape[1:3]
         axis.imshow(picture, interpolation="nearest")
