@@ -154,11 +154,11 @@ def compare_speed(architecture: str, rounds: int) -> None:
     times: dict[str, list[float]] = {"fast": [], "plain": [], "forward": []}
     for number in range(rounds + 1):
         torch.set_num_threads(os.cpu_count() or 1)
-        times["plain"].append(seconds(lambda n=number: plain.step(n)))
+        times["plain"] += [seconds(lambda n=number: plain.step(n)) for _ in range(3)]
         torch.set_num_threads(1)
         times["fast"] += [seconds(lambda n=number: fast.step(n)) for _ in range(3)]
-        times["forward"].append(seconds(lambda: fast.validate(0)) / 2)
-    best = {name: min(found[1:]) for name, found in times.items()}
+        times["forward"] += [seconds(lambda: fast.validate(0)) / 2 for _ in range(3)]
+    best = {name: min(found[3:]) for name, found in times.items()}
     forward, backward = operations(architecture, dataset)
     top = peak(torch.bfloat16)
     shares = forward / best["forward"] / top, backward / (best["fast"] - best["forward"]) / top

@@ -94,6 +94,11 @@ def test_the_committed_params_are_sound():
             "reward",
             "imitation.cells.no-image-reward.reads: must be 'reward.time_power' for this reward",
         ),
+        (
+            "imitation.reward.phi",
+            0.0,
+            "imitation.cells: no-feature-reward has no feature reward, and imitation.reward.phi 0 leaves",
+        ),
         ("real.ingest.frames", 10**6, "real.ingest.frames: Input should be less than or equal to 10000"),
     ],
 )

@@ -2,6 +2,7 @@
 
 import json
 import math
+import shutil
 import time
 from typing import Any
 
@@ -63,6 +64,19 @@ def test_git_sees_results_and_nothing_else(smoke):
     assert [
         name for name in changed if not name.startswith(allowed) and not name.endswith(".gitignore")
     ] == []
+
+
+def test_dvc_draws_the_plots_also_those_of_a_training_that_goes_on(smoke):
+    live = smoke.folder / "metrics/live/sim.csv"
+    assert "failed" not in smoke.run("sh", "-c", "dvc plots show 2>&1")
+    live.write_text("iteration,loss,validation_loss\n2,9.0,8765.4\n4,8.0,7654.3\n")
+    assert "failed" not in smoke.run("sh", "-c", "dvc plots show -o growing 2>&1")
+    live.unlink()
+    page = (smoke.folder / "growing/index.html").read_text()
+    assert "Translators in training" in page
+    assert "8765.4" in page
+    for folder in ("dvc_plots", "growing"):
+        shutil.rmtree(smoke.folder / folder)
 
 
 def test_metrics_are_plain_rounded_numbers(metrics):

@@ -86,7 +86,7 @@ def test_a_queue_of_one_method_and_the_report(study):
     found = {trial["value"]: trial["experiment"] for trial in told["trials"]}
     assert {0.01, 0.1, 1} <= found.keys()
     assert (study.folder / "sweep.svg").is_file()
-    shown = study.run("dvc", "exp", "show", "--no-pager")
+    shown = study.run("dvc", "exp", "show", "--csv")
     assert all(found[value] in shown for value in (0.01, 0.1))
     study.run("dvc", "exp", "apply", found[0.01])
     assert read_yaml(study.folder / "params.yaml")["imitation"]["reward"]["phi"] == 0.01

@@ -305,6 +305,17 @@ class Imitation(Block):
     discriminator: Discriminator
     cells: dict[str, ImitationCell]
 
+    @field_validator("cells")
+    @classmethod
+    def _phi_leaves_a_reward(
+        cls, cells: dict[str, ImitationCell], info: ValidationInfo
+    ) -> dict[str, ImitationCell]:
+        reward = info.data.get("reward")
+        for name, cell in cells.items():
+            if reward is not None and reward.phi == 0 and not cell.feature:
+                raise ValueError(f"{name} has no feature reward, and imitation.reward.phi 0 leaves no other")
+        return cells
+
 
 class Params(Block):
     """The whole of ``params.yaml``."""

@@ -122,6 +122,7 @@ def test_anatomy_reads_the_return_table_and_the_curves():
             return_policy=-20.0,
         )
     )
+    assert measured.distance == 0.05
     assert measured.carried == pytest.approx(21 / 53)
     assert measured.reached == pytest.approx(45 / 53)
     assert measured.guidance == pytest.approx(1.0)
@@ -136,19 +137,22 @@ def test_anatomy_of_a_learned_reward_has_no_return_table():
 @pytest.mark.parametrize(
     ("measured", "words"),
     [
-        (Anatomy(0.1, -3.0, None, None, 0.5, {}), "leads away from the task"),
-        (Anatomy(0.1, 50.0, 0.06, 0.9, 0.9, {}), "already earns 94%"),
-        (Anatomy(0.9, 50.0, 0.4, 0.9, 0.9, {}), "succeeds"),
+        (Anatomy(0.1, 0.03, -3.0, None, None, 0.5, {}), "leads away from the task"),
+        (Anatomy(0.1, 0.03, 50.0, 0.06, 0.9, 0.9, {}), "already earns 94%"),
+        (Anatomy(0.9, 0.03, 50.0, 0.4, 0.9, 0.9, {}), "succeeds"),
         (
-            Anatomy(0.0, None, None, None, -0.1, {"expert": 0.97}),
+            Anatomy(0.0, 0.03, None, None, None, -0.1, {"expert": 0.97}),
             "right: expert 97%): following this reward is not",
         ),
-        (Anatomy(0.1, None, None, None, 0.8, {}), "not near enough"),
-        (Anatomy(0.1, None, None, None, None, {}), "–"),
-        (Anatomy(0.1, 50.0, 0.4, 0.2, 0.0, {}), "wins only 20%"),
-        (Anatomy(0.1, 50.0, 0.4, 0.95, 0.0, {}), "matched without doing the task"),
-        (Anatomy(0.1, 50.0, 0.4, 0.95, 0.9, {}), "wins 95%"),
-        (Anatomy(0.1, 50.0, 0.4, 1.1, 0.9, {}), "optimum is not the goal"),
+        (Anatomy(0.1, 0.03, None, None, None, 0.8, {}), "not near enough"),
+        (Anatomy(0.1, 0.03, None, None, None, None, {}), "–"),
+        (Anatomy(0.1, 0.03, 50.0, 0.4, 0.2, 0.0, {}), "wins only 20%"),
+        (Anatomy(0.1, 0.03, 50.0, 0.4, 0.95, 0.0, {}), "matched without doing the task"),
+        (
+            Anatomy(0.1, 0.03, 50.0, 0.4, 0.95, 0.9, {}),
+            "ends 3.0\u00a0cm from the goal: the reward takes no more than 5%",
+        ),
+        (Anatomy(0.1, 0.03, 50.0, 0.4, 1.1, 0.9, {}), "optimum is not the goal"),
     ],
 )
 def test_the_reason_follows_from_the_measurements(measured, words):

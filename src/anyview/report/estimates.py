@@ -50,6 +50,23 @@ class Estimator:
         means = [_ratio_of_sums(resampled(_sums(*sample), rng), axis=1) for sample in samples]
         return Estimate(float(np.mean(above) / np.mean(below)), *quantile_interval(means[0] / means[1]))
 
+    def change_of_ratio(
+        self, name: str, above: np.ndarray, below: np.ndarray, groups: tuple[np.ndarray, np.ndarray]
+    ) -> Estimate:
+        """mean(above) / mean(below) of a second way minus that of a first, measured on the same two samples.
+
+        ``above`` (n, 2) and ``below`` (m, 2) hold both ways' values of a member, which are drawn together.
+        """
+        rng = self._stream(name)
+        means = []
+        for values, members in zip((above, below), groups, strict=True):
+            ways = np.concatenate([_sums(column, members) for column in values.T], axis=1)  # sum, count twice
+            totals = resampled(ways, rng).sum(axis=1)
+            means.append(totals[:, [0, 2]] / totals[:, [1, 3]])
+        ratios = means[0] / means[1]
+        measured = above.mean(axis=0) / below.mean(axis=0)
+        return Estimate(float(measured[1] - measured[0]), *quantile_interval(ratios[:, 1] - ratios[:, 0]))
+
     def share(self, name: str, part: np.ndarray, whole: np.ndarray) -> Estimate:
         """mean(part) / mean(whole) of pairs (n,), which are drawn together."""
         pairs = np.stack([part, whole], axis=1)

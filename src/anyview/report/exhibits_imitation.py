@@ -2,6 +2,9 @@
 
 from collections.abc import Iterator
 
+import numpy as np
+import pandas as pd
+
 from anyview.report import thesis
 from anyview.report.cells import FACTORIAL, OURS, ablated, compared, in_order, label
 from anyview.report.comparisons import Comparison, compare_with_ours, factorial_effects
@@ -39,6 +42,7 @@ def section(study: Study, metrics: Tree) -> Section:
         *_reasons(study),
         *_rollouts(study),
         *_table(metrics),
+        *_every_run(study),
     )
     text = (
         "A run is one new context and one new policy. Every method is evaluated in the same "
@@ -238,6 +242,25 @@ def _table(metrics: Tree) -> Iterator[Exhibit]:
             ("Returns are each under the method’s own reward: they do not compare between rewards.",),
             table=Table(("Method", "Runs", "Success", "Median final distance", "Return"), rows),
         )
+
+
+def _every_run(study: Study) -> Iterator[Exhibit]:
+    cells = in_order(study.evaluations)
+    if not cells:
+        return
+    distances = pd.DataFrame(
+        {cell: study.evaluations[cell].runs.set_index("run")["final_distance"] for cell in cells}
+    )
+    rows = tuple(
+        (label(cell), *("" if np.isnan(metres) else f"{100 * metres:.1f}" for metres in distances[cell]))
+        for cell in cells
+    )
+    yield Exhibit(
+        "runs",
+        "Every run",
+        ("Final distance in centimetres of each run: up to 2.0 is a success. One column is one context.",),
+        table=Table(("Method", *(str(run) for run in distances.index)), rows),
+    )
 
 
 def _bounds(values: Tree, name: str) -> tuple[float, float, float]:

@@ -9,7 +9,7 @@ from scipy import stats
 from anyview.report.cells import label
 from anyview.report.comparisons import ENOUGH_RUNS, Comparison, Effect
 from anyview.report.inputs import Evaluation
-from anyview.report.words import ABSENT, centimetres_spread, listed, percent
+from anyview.report.words import ABSENT, centimetres, centimetres_spread, listed, percent
 
 BLIND = 0.2
 """Rank correlation of return with nearness below which a reward counts as blind to the task."""
@@ -27,11 +27,13 @@ class Anatomy:
 
     ``worth`` is the return of the expert's own motion above that of standing still. Shares of it are
     ``carried``, which needs the object and not the arm alone, and ``reached``, which the policy wins.
+    ``distance`` is the median final one in metres.
     ``guidance`` is the rank correlation over training of a run's return with its nearness to the goal. All
     are medians over runs. ``accuracies`` of a discriminator by set of frames, mean over the last tenth.
     """
 
     success: float
+    distance: float
     worth: float | None
     carried: float | None
     reached: float | None
@@ -50,8 +52,9 @@ def anatomy(evaluation: Evaluation) -> Anatomy:
             carried = float((runs["return_expert"] - runs["return_arm_only"]).median() / worth)
             reached = float((runs["return_policy"] - runs["return_still"]).median() / worth)
     success = float(evaluation.runs["success"].mean())
+    distance = float(evaluation.runs["final_distance"].median())
     curve = evaluation.curve
-    return Anatomy(success, worth, carried, reached, _guidance(curve), _accuracies(curve))
+    return Anatomy(success, distance, worth, carried, reached, _guidance(curve), _accuracies(curve))
 
 
 def _guidance(curve: pd.DataFrame) -> float | None:
@@ -113,8 +116,9 @@ def why(measured: Anatomy) -> str:
             "not the goal."
         )
     return (
-        f"The policy wins {percent(reached)} of what the expert’s motion earns and still misses: so near the "
-        "goal, the reward hardly tells centimetres apart."
+        f"The policy wins {percent(reached)} of what the expert’s motion earns and ends "
+        f"{centimetres(measured.distance)} from the goal: the reward takes no more than "
+        f"{percent(1 - reached)} for that."
     )
 
 

@@ -77,6 +77,17 @@ def extreme_ratio(estimator: Estimator, cell: str, translation: Translation) -> 
     )
 
 
+def ratio_change(estimator: Estimator, first: Translation, second: Translation) -> Estimate:
+    """The extreme ratio of ``second`` minus that of ``first``, over the same clips."""
+    both = first.clips.merge(second.clips, on=["clip", "split"], suffixes=("", "_second"), validate="1:1")
+    samples, pairs = [], []
+    for split in ("extreme", "validation"):
+        rows = both[both["split"] == split]
+        samples.append(rows[["translation", "translation_second"]].to_numpy(float))
+        pairs.append(rows["pair" if "pair" in rows else "clip"].to_numpy())
+    return estimator.change_of_ratio("ratio change", samples[0], samples[1], (pairs[0], pairs[1]))
+
+
 def write_metrics(path: Path, metrics: Tree) -> None:
     """Write a tree of numbers as JSON; AnyviewError where a number is not finite."""
     write_atomically(path, json.dumps(_rounded(metrics, path.name), indent=2) + "\n")
