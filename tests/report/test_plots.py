@@ -18,6 +18,8 @@ def shown(full, params, root, tmp_path_factory):
     """``dvc plots show --json`` of the repository's own declarations over a whole study."""
     project = tmp_path_factory.mktemp("plots")
     write_plots(project / "metrics/plots", read_study(full / "data", params))
+    (project / "metrics/live").mkdir()
+    shutil.copy(root / "metrics/live/none.csv", project / "metrics/live")
     shutil.copy(root / "dvc.yaml", project)
     shutil.copy(root / "params.yaml", project)
     dvc = [sys.executable, "-m", "dvc"]
@@ -39,6 +41,7 @@ def test_every_declared_plot_is_drawn(shown):
         "Learning curves of policies",
         "Learning curves of translators",
         "Feature weights",
+        "metrics/live/none.csv",
     }
     pictures = {name for name, plots in shown["data"].items() if plots[0]["type"] == "image"}
     assert {"metrics/plots/idea.png", "metrics/plots/strips/sim.png"} <= pictures
