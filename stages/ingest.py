@@ -34,6 +34,8 @@ def main(arguments: list[str]) -> None:
             progress.advance()
     verdicts = ingest.settle(candidates, verdicts)
     if all(verdict.reason for verdict in verdicts):
+        for candidate, verdict in zip(candidates, verdicts, strict=True):
+            print(f"{candidate.file}: {verdict.reason}")
         first = source / candidates[0].file
         raise AnyviewError(f"{first}: {verdicts[0].reason}; none of {len(verdicts)} clips can be used")
     with whole_folder(OUTPUT) as output:

@@ -26,7 +26,12 @@ def main(arguments: list[str]) -> None:
     else:  # a simulated demonstration is seen from one viewpoint: each is a pair of its own
         clips = read_table(SETS[name], ["clip"], unique="clip")
         clips = clips.assign(pair=clips["clip"], kind="standard")
-        train, validation = 1.0 - params.split.sim.validation, params.split.sim.validation
+        validation = params.split.sim.validation
+        if validation >= len(clips):
+            raise AnyviewError(
+                f"params.yaml: split.sim.validation: {validation:.0f}, but {name} has {len(clips)} clips"
+            )
+        train = len(clips) - validation if validation >= 1 else 1.0 - validation
     table = split_pairs(clips, params.base.seed, train, validation)
     write_atomically(Path("data/splits") / f"{name}.csv", table.to_csv(index=False))
     counts = ", ".join(f"{count} {split}" for split, count in table["split"].value_counts().items())

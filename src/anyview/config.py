@@ -26,9 +26,17 @@ def _feasible(count: int) -> int:
     return count
 
 
+def _count_or_fraction(value: float) -> float:
+    if value >= 1 and value % 1 != 0:
+        raise ValueError("must be a whole count or a fraction below 1")
+    return value
+
+
 Count = Annotated[int, Field(ge=1), AfterValidator(_feasible)]
+CountOrNone = Annotated[int, Field(ge=0), AfterValidator(_feasible)]
 NonNegative = Annotated[float, Field(ge=0)]
 Positive = Annotated[float, Field(gt=0)]
+CountOrFraction = Annotated[float, Field(gt=0), AfterValidator(_count_or_fraction)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
 Discount = Annotated[float, Field(ge=0, lt=1)]
 
@@ -72,8 +80,8 @@ class Film(Block):
     """Stage `film`: the surrogate webcam clips."""
 
     pairs: Count = Field(description="pairs of two views of one demonstration")
-    singles: int = Field(ge=0, description="demonstrations that one camera saw")
-    extreme_pairs: int = Field(ge=0, description="pairs of extreme distractor clips, for validation only")
+    singles: CountOrNone = Field(description="demonstrations that one camera saw")
+    extreme_pairs: CountOrNone = Field(description="pairs of extreme distractor clips, for validation only")
     width: int = Field(
         ge=160, le=1920, multiple_of=32, description="width of a raw frame; the height is 9/16 of it"
     )
@@ -101,21 +109,16 @@ class Real(Block):
 class SplitSim(Block):
     """Split of a simulated set."""
 
-    validation: float = Field(gt=0, lt=1, description="fraction of the demonstrations held out")
+    validation: CountOrFraction = Field(
+        description="demonstrations held out: a count, or a fraction such as 0.1"
+    )
 
 
 class SplitReal(Block):
     """Split of the real clips, by pair. Counts that the data cannot fill are taken as proportions."""
 
-    train: Positive = Field(description="clips to train on: a count, or a fraction such as 0.85")
-    validation: Positive = Field(description="clips held out: a count, or a fraction")
-
-    @field_validator("train", "validation")
-    @classmethod
-    def _count_or_fraction(cls, value: float) -> float:
-        if value >= 1 and value % 1 != 0:
-            raise ValueError("must be a whole count or a fraction below 1")
-        return value
+    train: CountOrFraction = Field(description="clips to train on: a count, or a fraction such as 0.85")
+    validation: CountOrFraction = Field(description="clips held out: a count, or a fraction")
 
 
 class Split(Block):
@@ -217,10 +220,10 @@ class DDPG(Block):
     target_rate: Annotated[float, Field(gt=0, le=1)] = Field(description="Polyak rate of the target networks")
     replay: Count = Field(description="transitions kept per run")
     recent_episodes: Count = Field(description="half of each batch comes from this many newest episodes")
-    warmup_episodes: int = Field(ge=0, description="episodes of noise alone before updates start")
+    warmup_episodes: CountOrNone = Field(description="episodes of noise alone before updates start")
     n_step: Annotated[int, Field(ge=1, le=49)] = Field(description="rewards summed before bootstrapping")
-    time_bumps: int = Field(
-        ge=0, description="Gaussian bumps over the episode that show the networks the time"
+    time_bumps: CountOrNone = Field(
+        description="Gaussian bumps over the episode that show the networks the time"
     )
     noise: Positive = Field(description="Ornstein-Uhlenbeck deviation at first, in units of the action range")
     noise_end: Positive = Field(description="the same at the end; it falls geometrically")

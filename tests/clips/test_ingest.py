@@ -365,3 +365,41 @@ def test_the_stage_takes_a_mixed_folder_and_one_bad_clip_stops_nothing(tmp_path,
     split = pd.read_csv(tmp_path / "data/splits/real.csv")
     assert split["split"].value_counts().to_dict() == {"train": 2, "validation": 2}
     assert (split.groupby("pair")["split"].nunique() == 1).all()
+
+
+def nested(name: str) -> bytes:
+    """A container of thousands of containers in each other."""
+    depth = 3000
+    if name.endswith(".mp4"):
+        boxes = b"".join(struct.pack(">I4s", 8 * (depth - level), b"moov") for level in range(depth))
+        return struct.pack(">I4s4sI", 16, b"ftyp", b"isom", 0) + boxes
+    lists = b"".join(
+        struct.pack("<4sI4s", b"LIST", 12 * (depth - level) - 8, b"movi" if level == 0 else b"rec ")
+        for level in range(depth)
+    )
+    return struct.pack("<4sI4s", b"RIFF", len(lists) + 4, b"AVI ") + lists
+
+
+@pytest.mark.parametrize("name", ["clip.mp4", "clip.avi"])
+def test_endless_nesting_is_refused(tmp_path, name):
+    (tmp_path / name).write_bytes(nested(name))
+    assert judge(tmp_path, name, tmp_path / "out") == "damaged: nested too deeply"
+
+
+def test_a_sidecar_of_giant_numbers_is_refused(tmp_path):
+    write_raw(tmp_path / "clip.avi", pictures())
+    (tmp_path / "clip.times.csv").write_text("seconds\n" + "9" * 400 + "\n" + "9" * 401 + "\n")
+    assert "clip.times.csv: " in judge(tmp_path, "clip.avi", tmp_path / "out")
+
+
+def test_a_clip_that_mostly_stands_still_is_refused(tmp_path):
+    write_raw(tmp_path / "clip.avi", np.repeat(pictures()[::8], 8, axis=0), codec="FFV1")
+    assert judge(tmp_path, "clip.avi", tmp_path / "out").startswith("frozen: ")
+
+
+def test_a_transport_stream_that_was_cut_is_refused(tmp_path):
+    path = write_raw(tmp_path / "clip.ts", pictures(100), codec="mp4v")
+    assert judge(tmp_path, "clip.ts", tmp_path / "whole") == ""
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) * 19 // 20 // 188 * 188 + 1])
+    assert judge(tmp_path, "clip.ts", tmp_path / "out") == "damaged: cut short"

@@ -3,6 +3,7 @@
 import json
 import re
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -78,6 +79,8 @@ def test_two_views_are_filmed_at_once_and_ingest_takes_them(tmp_path, sources):
         (["--camera", "left={}/absent.mp4"], "absent.mp4: no such file"),
         (["--camera", "left={}"], "no such file"),
         (["--camera", "left=77"], "camera left: 77 gives no picture"),
+        (["--camera", "left=99999999999"], "camera left: 99999999999: no such device"),
+        (["--camera", "left=²"], "²: no such file"),
         (["--camera", "left"], "--camera left: write NAME=SOURCE"),
         (["--camera", "left={}/a.mp4", "--camera", "left={}/b.avi"], "give each another name"),
         (["--camera", "../x={}/a.mp4"], "'../x': a name has only"),
@@ -142,6 +145,17 @@ def test_the_preview_shows_the_views_on_loopback_and_waits_for_enter(tmp_path, s
     _, err = process.communicate("\n", timeout=60)
     assert (process.returncode, err) == (0, "")
     assert (tmp_path / "raw" / "manifest.csv").exists()
+
+
+def test_a_port_that_is_taken_is_told(tmp_path, sources):
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = str(taken.getsockname()[1])
+        arguments = ("--preview", "--port", port, "--camera", f"left={sources / 'a.mp4'}")
+        code, _, err = run("record", "raw", *arguments, cwd=tmp_path)
+    assert (code, err) == (
+        2,
+        f"error: --port {port}: Address already in use; choose another, or 0 for a free one\n",
+    )
 
 
 def listening_addresses(port: int) -> set[str]:

@@ -1,5 +1,9 @@
 """Splits: exact counts, no leak between the views of a demonstration, and places that stay put."""
 
+import shutil
+import subprocess
+import sys
+
 import pandas as pd
 import pytest
 from hypothesis import given, settings
@@ -7,6 +11,7 @@ from hypothesis import strategies as st
 
 from anyview.clips.splits import read_split, split_pairs
 from anyview.runtime.errors import AnyviewError
+from tests.long_stages import change
 
 
 def clips(pairs: int, singles: int = 0, extreme_pairs: int = 0, kinds=("standard",)) -> pd.DataFrame:
@@ -90,3 +95,20 @@ def test_a_split_table_with_an_unknown_split_is_refused(tmp_path):
     (tmp_path / "real.csv").write_text("clip,pair,split\na,b,test\n")
     with pytest.raises(AnyviewError, match=r"real\.csv.*'test'"):
         read_split(tmp_path / "real.csv")
+
+
+@pytest.mark.parametrize(("held_out", "expected"), [(0.25, 5), (3, 3), (20, None)])
+def test_a_simulated_set_is_split_by_a_fraction_or_a_count(tmp_path, root, held_out, expected):
+    folder = tmp_path / "data/sim/diverse"
+    folder.mkdir(parents=True)
+    pd.DataFrame({"clip": [f"c{index}" for index in range(20)]}).to_csv(folder / "manifest.csv", index=False)
+    shutil.copy(root / "params.yaml", tmp_path)
+    change(tmp_path, {"split.sim.validation": held_out})
+    command = [sys.executable, str(root / "stages/split.py"), "sim-diverse"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    if expected is None:
+        assert (done.returncode, "Traceback" in done.stderr) == (2, False)
+        assert "split.sim.validation: 20, but sim-diverse has 20 clips" in done.stderr
+    else:
+        counts = read_split(tmp_path / "data/splits/sim-diverse.csv")["split"].value_counts()
+        assert dict(counts) == {"train": 20 - expected, "validation": expected}

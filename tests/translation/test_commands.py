@@ -1,7 +1,9 @@
 """The stages and `anyview translate`, as a user runs them."""
 
+import struct
 import subprocess
 import sys
+import zlib
 from pathlib import Path
 
 import cv2
@@ -15,6 +17,7 @@ from anyview.clips.video import read_video, write_video
 from anyview.runtime.errors import AnyviewError
 from anyview.translation.commands import translate
 from anyview.translation.evaluation import translate_clip
+from anyview.translation.footage import read_view
 from anyview.translation.network import ContextTranslator
 from anyview.translation.weights import load_translator, save_translator
 from tests.translation.discworld import disc_clips
@@ -108,6 +111,16 @@ def test_bad_footage_is_refused_in_one_line(footage):
         "out.avi",
     )
     assert_refused(run(*command), "absent.avi: no such file")
+
+
+def test_a_view_that_claims_a_giant_picture_is_refused(tmp_path):
+    content = bytearray(cv2.imencode(".png", np.zeros((8, 8, 3), np.uint8))[1])
+    content[16:24] = struct.pack(">II", 100_000, 100_000)
+    content[29:33] = struct.pack(">I", zlib.crc32(content[12:29]))
+    path = tmp_path / "view.png"
+    path.write_bytes(content)
+    with pytest.raises(AnyviewError, match=r"view\.png: damaged"):
+        read_view(path, 48)
 
 
 def test_wide_clips_are_cut_to_their_middle_and_a_clip_may_be_the_context(footage):

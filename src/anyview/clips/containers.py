@@ -1,7 +1,7 @@
 """Structure of video containers: find files that were cut short or altered, which FFmpeg plays all the same.
 
-Covers AVI (RIFF), MP4 and MOV (ISO 14496-12), Matroska and WebM (RFC 9559); a file of any other container is
-judged by decoding it. Only headers are read.
+Covers AVI (RIFF), MP4 and MOV (ISO 14496-12), Matroska and WebM (RFC 9559); of MPEG transport streams, that
+their packets are whole. A file of any other container is judged by decoding it. Only headers are read.
 """
 
 import struct
@@ -12,6 +12,7 @@ from typing import BinaryIO
 
 MAX_PIXELS = 4096 * 2304  # of a picture
 _MAX_PARTS = 200_000  # of one file; ten minutes of video have a tenth of that
+_PACKET = 188  # bytes of a transport stream, the first of each a G
 
 
 class Damaged(Exception):
@@ -26,13 +27,22 @@ def check_container(path: Path) -> float:
     """
     size = path.stat().st_size
     with path.open("rb") as handle:
-        start = handle.read(12)
-        if start[:4] == b"RIFF" and start[8:] == b"AVI ":
-            _Avi(handle, size).check()
-        elif start[4:8] in (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip"):
-            return _Mp4(handle, size).check()
-        elif start[:4] == b"\x1a\x45\xdf\xa3":
-            _Matroska(handle, size).check()
+        try:
+            return _check(handle, size)
+        except RecursionError:
+            raise Damaged("nested too deeply") from None
+
+
+def _check(handle: BinaryIO, size: int) -> float:
+    start = handle.read(_PACKET + 1)
+    if start[:4] == b"RIFF" and start[8:12] == b"AVI ":
+        _Avi(handle, size).check()
+    elif start[4:8] in (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip"):
+        return _Mp4(handle, size).check()
+    elif start[:4] == b"\x1a\x45\xdf\xa3":
+        _Matroska(handle, size).check()
+    elif start[:1] == start[_PACKET:] == b"G" and size % _PACKET:
+        raise Damaged("cut short")
     return 1.0
 
 
@@ -75,6 +85,8 @@ class _Avi(_Container):
                 elif kind == b"movi":
                     found += self._frames(start, stop)
                 elif kind == b"idx1":
+                    if stop - start > 16 * _MAX_PARTS:
+                        raise Damaged("too many parts")
                     entries = self.read(start, stop - start)
                     indexed = sum(
                         entries[i + 2 : i + 4] in (b"dc", b"db") for i in range(0, len(entries), 16)
@@ -183,6 +195,8 @@ class _Mp4(_Container):
                     raise Damaged(f"claims a picture of {width} x {height}")
             elif kind == b"stsz":
                 fixed, samples = struct.unpack(">II", self.read(start + 4, 8))
+                if samples > _MAX_PARTS:
+                    raise Damaged("too many parts")
                 if fixed * samples > self._size or (not fixed and 4 * samples > stop - start):
                     raise Damaged("claims more frames than it holds")
                 if (
@@ -193,7 +207,7 @@ class _Mp4(_Container):
             elif kind in (b"stco", b"co64"):
                 width = 4 if kind == b"stco" else 8
                 entries = struct.unpack(">I", self.read(start + 4, 4))[0]
-                if width * entries > stop - start:
+                if entries > _MAX_PARTS or width * entries > stop - start:
                     raise Damaged("altered")
                 content = self.read(start + 8, width * entries)
                 offsets = struct.unpack(f">{entries}{'I' if width == 4 else 'Q'}", content)

@@ -18,6 +18,7 @@ MAX_RATE = 250.0  # frames a second
 PATIENCE = 120.0  # seconds of decoding, a hundred times what a clip takes
 LONGEST_GAP = 2.5  # output periods without a source frame
 MAX_REPEATS = 0.1  # of a clip's frames may show their predecessor again: the camera was a little slow
+MAX_STILL = 0.5  # of a clip's frames may be their predecessor's copy: somebody pauses
 STILL_SECONDS = 2.0  # longer without a single changed pixel: the camera hung
 MIN_MOTION = 1.0  # grey levels, the mean over a picture, between the first frame and the most different one
 MIN_CONTRAST = 4.0  # grey levels, standard deviation within a picture
@@ -54,7 +55,7 @@ def _sidecar_times(path: Path) -> np.ndarray | None:
         return None
     try:
         times = read_table(sidecar, ["seconds"])["seconds"].to_numpy(float)
-    except (AnyviewError, ValueError):
+    except (AnyviewError, ValueError, OverflowError):
         raise Refused(f"{sidecar.name}: not a table of seconds") from None
     if len(times) < 2 or not np.isfinite(times).all() or (np.diff(times) <= 0).any():
         raise Refused(f"{sidecar.name}: the times do not increase")
@@ -77,6 +78,8 @@ def _decode(path: Path, sidecar: np.ndarray | None, shown: float, limits: Ingest
                 frames[filled] = _shrink(capture.retrieve()[1], limits.size)
                 filled, used = filled + 1, used + 1
         declared = shown * capture.get(cv2.CAP_PROP_FRAME_COUNT)
+        if capture.get(cv2.CAP_PROP_FPS) > MAX_RATE:  # of a container's clock: no rate, so no count is stated
+            declared = 0
         damage = messages.damage()
     if not decoded:
         raise Refused(f"damaged, or of a codec that is unknown here: {damage or 'no frame can be decoded'}")
@@ -152,8 +155,11 @@ def _check_content(frames: np.ndarray, rate: float) -> None:
         raise Refused("without colour")
     if np.abs(grey - grey[0]).mean(axis=(1, 2)).max() < MIN_MOTION:
         raise Refused("nothing moves")
+    changes = (frames[1:] != frames[:-1]).any(axis=(1, 2, 3))
+    if changes.mean() < 1 - MAX_STILL:
+        raise Refused(f"frozen: {len(changes) - changes.sum()} of {len(frames)} frames repeat the one before")
     longest = still = 0
-    for changed in (frames[1:] != frames[:-1]).any(axis=(1, 2, 3)):
+    for changed in changes:
         still = 0 if changed else still + 1
         longest = max(longest, still)
     if longest > STILL_SECONDS * rate:

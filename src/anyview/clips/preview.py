@@ -10,6 +10,7 @@ from typing import Any
 import cv2
 
 from anyview.clips.recording import Camera
+from anyview.runtime.errors import AnyviewError
 
 _FRAMES_PER_SECOND = 10
 _WIDTH = 640
@@ -59,7 +60,11 @@ def serving(cameras: Sequence[Camera], port: int = 0) -> Iterator[str]:
             """Keep requests off the terminal."""
 
     stopping = threading.Event()
-    with ThreadingHTTPServer(("127.0.0.1", port), Handler) as server:
+    try:
+        server = ThreadingHTTPServer(("127.0.0.1", port), Handler)
+    except OSError as error:
+        raise AnyviewError(f"--port {port}: {error.strerror}; choose another, or 0 for a free one") from None
+    with server:
         server.daemon_threads = True
         threading.Thread(target=server.serve_forever, daemon=True).start()
         try:

@@ -22,6 +22,15 @@ PATIENCE = 2.0  # seconds without a frame before a camera counts as unplugged
 _WISHED_SIZE = (1280, 720)
 
 
+def _device_number(name: str, source: str) -> int | None:
+    """The number of a camera device; None where ``source`` is a file."""
+    if not (source.isascii() and source.isdigit()):
+        return None
+    if len(source) > 4:
+        raise AnyviewError(f"camera {name}: {source}: no such device; on Linux /dev/video2 is number 2")
+    return int(source)
+
+
 class Camera:
     """A camera device (``"0"``) or a video file that stands for one; its newest frame is always at hand.
 
@@ -36,9 +45,10 @@ class Camera:
         self._stopping = threading.Event()
         self._changed = threading.Condition()
         self._ended = False
-        if source.isdigit():
+        self._device = _device_number(name, source)
+        if self._device is not None:
             self._stack.enter_context(listening())  # OpenCV's warnings would spoil the display
-            self._capture = _open_device(int(source))
+            self._capture = _open_device(self._device)
             self._stack.callback(self._capture.release)
         else:
             self._capture, _ = self._stack.enter_context(open_capture(Path(source)))
@@ -62,7 +72,7 @@ class Camera:
             self._changed.wait_for(lambda: self._newest[1] > after or self._ended, PATIENCE)
         if self._newest[1] <= after:
             reason = (
-                "no frame comes; was it unplugged?" if self.source.isdigit() else "the file ends too early"
+                "the file ends too early" if self._device is None else "no frame comes; was it unplugged?"
             )
             raise AnyviewError(f"camera {self.name}: {reason}")
 
@@ -78,7 +88,7 @@ class Camera:
         self._stack.close()
 
     def _watch(self) -> None:
-        file = not self.source.isdigit()
+        file = self._device is None
         if file:
             self._rolling.wait()
             self._show(self._newest[0])

@@ -28,7 +28,10 @@ def read_view(path: Path, size: int) -> np.ndarray:
     """A picture, or the first frame of a video, as uint8 RGB (size, size, 3)."""
     if not path.is_file():
         raise AnyviewError(f"{path}: no such file")
-    picture = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_COLOR) if path.stat().st_size else None
+    try:
+        picture = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_COLOR) if path.stat().st_size else None
+    except cv2.error:
+        raise AnyviewError(f"{path}: damaged, or a picture too large to open") from None
     return _read(path, size, 1)[0][0] if picture is None else _square(picture, size)
 
 
