@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from anyview.config import load_params
+from tests.long_stages import digests
 
 BOUNDS = ("", "_low", "_high")
 
@@ -77,6 +78,17 @@ def test_dvc_draws_the_plots_also_those_of_a_training_that_goes_on(smoke):
     assert "8765.4" in page
     for folder in ("dvc_plots", "growing"):
         shutil.rmtree(smoke.folder / folder)
+
+
+def test_a_report_that_fails_leaves_the_metrics_as_they_were(smoke, tmp_path):
+    study = smoke.copy(tmp_path)
+    (study.folder / "data/policies/ours/runs.csv").write_text("not a table of runs\n")
+    before = digests(study.folder / "metrics")
+    process = study.start("dvc", "repro", "--single-item", "report")
+    said = "".join(process.communicate())
+    assert process.returncode != 0
+    assert "data/policies/ours/runs.csv: " in said
+    assert digests(study.folder / "metrics") == before
 
 
 def test_metrics_are_plain_rounded_numbers(metrics):
