@@ -50,6 +50,7 @@ def shrunk(frame: np.ndarray) -> np.ndarray:
         ("clip.mov", "mp4v", 90, 160, 25.0),
         ("clip.mkv", "XVID", 200, 150, 15.0),
         ("clip.webm", "VP80", 96, 64, 20.0),
+        ("clip.mpg", "PIM1", 160, 96, 25.0),
     ],
 )
 def test_any_container_codec_size_and_rate_becomes_the_right_frames(

@@ -103,7 +103,7 @@ def _grab_all(capture: cv2.VideoCapture, sidecar: np.ndarray | None, limits: Ing
     """Grab frame after frame and yield its time: seconds by the sidecar, else from the first frame."""
     longest = LONGEST * limits.frames / limits.rate
     deadline = monotonic() + PATIENCE
-    start = last = 0.0
+    start = last = step = 0.0
     decoded = 0
     while capture.grab():
         if sidecar is not None and decoded == len(sidecar):
@@ -111,6 +111,8 @@ def _grab_all(capture: cv2.VideoCapture, sidecar: np.ndarray | None, limits: Ing
         time = capture.get(cv2.CAP_PROP_POS_MSEC) / 1e3 if sidecar is None else float(sidecar[decoded])
         if sidecar is None and decoded == 0:
             start = time
+        elif sidecar is None and time == 0:  # not known: the last frame of an MPEG program stream
+            time = start + last + step
         time -= start
         if time < last and decoded:
             raise Refused("its frames' times run backwards")
@@ -121,7 +123,7 @@ def _grab_all(capture: cv2.VideoCapture, sidecar: np.ndarray | None, limits: Ing
         if monotonic() > deadline:
             raise Refused(f"takes more than {PATIENCE:g} s to decode")
         yield time
-        decoded, last = decoded + 1, time
+        decoded, last, step = decoded + 1, time, time - last
     if sidecar is not None and decoded != len(sidecar):
         raise Refused(f"its sidecar lists {len(sidecar)} frames, the clip has {decoded}")
 
