@@ -78,8 +78,6 @@ def _decode(path: Path, sidecar: np.ndarray | None, shown: float, limits: Ingest
                 frames[filled] = _shrink(capture.retrieve()[1], limits.size)
                 filled, used = filled + 1, used + 1
         declared = shown * capture.get(cv2.CAP_PROP_FRAME_COUNT)
-        if capture.get(cv2.CAP_PROP_FPS) > MAX_RATE:  # of a container's clock: no rate, so no count is stated
-            declared = 0
         damage = messages.damage()
     if not decoded:
         raise Refused(f"damaged, or of a codec that is unknown here: {damage or 'no frame can be decoded'}")
