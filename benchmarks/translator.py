@@ -138,9 +138,10 @@ def peak(dtype: torch.dtype, size: int = 2048) -> float:
 def operations(architecture: str, dataset: Dataset) -> tuple[int, int]:
     """Floating-point operations of the fast loop's network, forward and backward, for one batch."""
     model = ContextTranslator(architecture, dataset.image_size)
-    frames = [to_input(f) for f in training_pairs(dataset, stream(0, "count"), BATCH).frames(dataset)]
+    pairs = training_pairs(dataset, stream(0, "count"), BATCH)
+    expert, context, target = (to_input(frames) for frames in pairs.frames(dataset))
     with FlopCounterMode(display=False) as forward:
-        loss = batch_losses(model, *frames).total(ONE)
+        loss = batch_losses(model, torch.cat((expert, target)), context).total(ONE)
     with FlopCounterMode(display=False) as backward:
         loss.backward()
     return forward.get_total_flops(), backward.get_total_flops()

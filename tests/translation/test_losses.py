@@ -20,7 +20,8 @@ def model() -> ContextTranslator:
 
 @pytest.fixture
 def batch() -> tuple[torch.Tensor, ...]:
-    return tuple(torch.rand(3, 6, 3, 16, 16).mul(2).sub(1))
+    """Six pairs of frames, the expert's before the target's, and the six contexts."""
+    return tuple(torch.rand(18, 3, 16, 16).mul(2).sub(1).split((12, 6)))
 
 
 def test_frame_loss_is_half_the_squares_of_a_batch_of_a_hundred():
@@ -32,6 +33,18 @@ def test_frame_loss_is_half_the_squares_of_a_batch_of_a_hundred():
     assert part == pytest.approx(10 * 0.5 * ((output[:10] - target[:10]) ** 2).sum(), rel=1e-6)
 
 
+@pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
+def test_the_gradient_of_the_frame_loss_is_the_scaled_difference(dtype):
+    output = torch.randn(10, 3, 4, 4).to(dtype).requires_grad_()
+    target = torch.randn(10, 3, 4, 4)
+    (gradient,) = torch.autograd.grad(3 * frame_loss(output, target), output)
+    assert gradient.dtype == dtype
+    expected = 3 * 2 * (100 / 2 / 10) * (output.detach().double() - target.double())
+    torch.testing.assert_close(
+        gradient.double(), expected, rtol=1e-2 if dtype == torch.bfloat16 else 1e-5, atol=1e-5
+    )
+
+
 def test_alignment_loss_is_a_thousand_times_the_mean_square():
     rng = np.random.default_rng(1)
     z3, z = rng.normal(size=(2, 30, 8))
@@ -41,7 +54,7 @@ def test_alignment_loss_is_a_thousand_times_the_mean_square():
 
 def test_losses_compare_what_the_equations_say(model, batch):
     """L_tr, L_rec and L_align from the network's parts, called one by one as the equations write them."""
-    expert, context, target = batch
+    (expert, target), context = batch[0].chunk(2), batch[1]
     with torch.no_grad():
         found = batch_losses(model, *batch)
         z2, skips = model.encode_context(context)

@@ -5,6 +5,7 @@ times the mean (inferred: the thesis does not say). So the scale stays the same 
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import torch
 from torch import Generator, Tensor
@@ -41,7 +42,23 @@ class Losses:
 
 def frame_loss(output: Tensor, target: Tensor) -> Tensor:
     """50 |output - target|^2, mean over the batch; both (N, 3, H, W) in [-1, 1]."""
-    return F.mse_loss(output.float(), target, reduction="sum") * (FRAME_SCALE / len(target))
+    return torch.as_tensor(_SquaredError.apply(output, target)) * (FRAME_SCALE / len(target))
+
+
+class _SquaredError(torch.autograd.Function):
+    """The sum of squares of output - target; backward scales the difference that forward left.
+
+    PyTorch's own subtracts twice and fills a gradient of the pictures' size with zeros first.
+    """
+
+    @staticmethod
+    def forward(ctx: Any, output: Tensor, target: Tensor) -> Tensor:
+        ctx.difference, ctx.dtype = output.to(torch.float32, copy=True).sub_(target), output.dtype
+        return ctx.difference.square().sum()
+
+    @staticmethod
+    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None]:
+        return ctx.difference.mul_(2 * gradient).to(ctx.dtype), None
 
 
 def alignment_loss(z3: Tensor, z_true: Tensor) -> Tensor:
@@ -51,18 +68,18 @@ def alignment_loss(z3: Tensor, z_true: Tensor) -> Tensor:
 
 def batch_losses(
     model: ContextTranslator,
-    expert: Tensor,
+    paired: Tensor,
     context: Tensor,
-    target: Tensor,
     wanted: LossWeights | None = None,
     noise: Generator | None = None,
 ) -> Losses:
-    """Losses of o_t^i, o_0^j and o_t^j, each (N, 3, H, W) in [-1, 1].
+    """Losses of ``paired`` (2N, 3, H, W), o_t^i and after them o_t^j, and ``context`` o_0^j (N, 3, H, W).
 
-    With ``wanted`` only the losses whose weight is above 0 are computed; ``noise`` turns dropout on. Both
-    passes through Enc1 are one batch, and both decodings share what the decoder makes of the skips.
+    Frames are in [-1, 1]. With ``wanted`` only the losses whose weight is above 0 are computed; ``noise``
+    turns dropout on. Both decodings share what the decoder makes of the skips.
     """
-    z1, z_true = model.encode_expert(torch.cat((expert, target)), noise).chunk(2)
+    target = paired[len(context) :]
+    z1, z_true = model.encode_expert(paired, noise).chunk(2)
     z2, skips = model.encode_context(context, noise)
     z3 = model.translate(z1, z2, noise)
     shares = model.decoder.shares(skips)

@@ -76,16 +76,18 @@ class Trainer:
     ) -> tuple[Tensor, tuple[Tensor | None, ...]]:
         """What a part of a batch, the ``share`` of it, adds to the batch's losses and gradients."""
         cell, seed = self._recipe.cell, self._recipe.seed
-        expert, context, target = self._frames(pairs)
+        paired, context = self._frames(pairs)
         if self._augmentation is not None:
             rng = stream(seed, "translator/augmentation", iteration, part)
+            expert, target = paired.chunk(2)
             (expert,) = self._augmentation(expert[None], pairs.sources, rng)
             context, target = self._augmentation(torch.stack((context, target)), pairs.targets, rng)
+            paired = torch.cat((expert, target))
         noise = torch.Generator(self._device).manual_seed(
             torch_seed(seed, "translator/dropout", iteration, part)
         )
         with self._autocast():
-            losses = batch_losses(self.model, expert, context, target, cell.weights, noise)
+            losses = batch_losses(self.model, paired, context, cell.weights, noise)
         total = losses.total(cell.weights)
         gradients = torch.autograd.grad(total * share, self._parameters, allow_unused=True)
         return torch.stack((total.detach(), *losses.parts())) * share, gradients
@@ -139,9 +141,13 @@ class Trainer:
             state.setdefault(int(index), {})[key] = _laid_out_as(parameter if moment else value, value)
         self._optimizer.load_state_dict(self._optimizer.state_dict() | {"state": state})
 
-    def _frames(self, pairs: FramePairs) -> tuple[Tensor, Tensor, Tensor]:
-        expert, context, target = (torch.tensor(f, device=self._device) for f in pairs.frames(self._dataset))
-        return to_input(expert), to_input(context), to_input(target)
+    def _frames(self, pairs: FramePairs) -> tuple[Tensor, Tensor]:
+        """o_t^i and after them o_t^j (2N, 3, H, W), and o_0^j (N, 3, H, W): what ``batch_losses`` takes."""
+        frames, targets = self._dataset.frames, pairs.targets
+        paired = frames[np.concatenate((pairs.sources, targets)), np.tile(pairs.times, 2)]
+        first = frames[targets, np.zeros_like(targets)]
+        paired, context = (to_input(torch.from_numpy(f).to(self._device)) for f in (paired, first))
+        return paired, context
 
     def _autocast(self) -> torch.autocast:
         reduced = self._recipe.training.precision == "bfloat16"
