@@ -26,6 +26,7 @@ help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1|/p' Makefile | awk -F'|' '{printf "  make %-10s %s\n", $$1, $$2}'
 
 repro: .setup-stamp .setup-stamp-graphics ## run the whole pipeline; only what changed runs again
+	python stages/check.py
 	dvc repro
 
 test: lint .setup-stamp-graphics ## lint, type check and the fast tests
@@ -77,6 +78,8 @@ clean: ## remove environments and caches; data, results and DVC's cache stay
 	$(INSTALL) $(PIP_ARGS) $(TORCH)
 	$(INSTALL) --no-deps --no-build-isolation --require-hashes -r requirements.lock
 	$(INSTALL) --no-deps --no-build-isolation --editable .
+	@grep -q PYTHONHASHSEED .venv/bin/activate || \
+		echo 'export PYTHONHASHSEED=0  # dvc metrics diff lists sets: the same order every time' >> .venv/bin/activate
 	@touch $@
 
 .setup-stamp-dev: .setup-stamp requirements-dev.lock

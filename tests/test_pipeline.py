@@ -91,6 +91,31 @@ def test_a_report_that_fails_leaves_the_metrics_as_they_were(smoke, tmp_path):
     assert digests(study.folder / "metrics") == before
 
 
+@pytest.mark.parametrize(
+    ("before", "after", "code", "said"),
+    [
+        ("base:", "bass: 1\nbase:", 2, "error: params.yaml: bass: unknown key"),
+        (
+            "warmup_episodes: 1",
+            "warmup_episodes: 1000",
+            0,
+            "fewer than ddpg.warmup_episodes 1000: DDPG learns nothing",
+        ),
+    ],
+)
+def test_what_no_stage_reads_is_checked_as_well(smoke, tmp_path, before, after, code, said):
+    """An up-to-date tree, so that no other stage runs."""
+    study = smoke.copy(tmp_path)
+    path = study.folder / "params.yaml"
+    assert before in path.read_text()
+    path.write_text(path.read_text().replace(before, after, 1))
+    process = study.start("dvc", "repro", "check")
+    output = "".join(process.communicate())
+    assert (process.returncode != 0) == (code != 0)
+    assert said in output
+    assert "Traceback" not in output
+
+
 def test_metrics_are_plain_rounded_numbers(metrics):
     assert metrics.keys() == {"data", "translation", "imitation"}
     for name, value in leaves(metrics):

@@ -130,8 +130,10 @@ def profile(
     Only the keys that profiles set are changed; comments and your other values stay.
     """
     from anyview import profiles
+    from anyview.config import load_params
 
     if name is None or check:
+        load_params()
         active = profiles.active_profile()
         differing = profiles.differences(name or active or profiles.DEFAULT)
         if as_json:

@@ -43,14 +43,28 @@ def write_raw(path: Path, frames: np.ndarray, fps: float = 10.0, codec: str = "X
 
 
 def damaged(content: bytes, count: int, seed: int) -> Iterator[tuple[str, bytes]]:
-    """``count`` damaged versions of a file, each with what was done to it."""
+    """``count`` damaged versions of a file, each with what was done to it ("renamed": to you)."""
     rng = stream(seed, "damage")
     header = 6000 if len(content) > 12000 else len(content) // 2
-    ways = ("cut", "header", "payload", "hole", "cut", "moved", "header", "longer", "emptied", "other")
+    ways = (
+        "cut",
+        "header",
+        "payload",
+        "hole",
+        "cut",
+        "moved",
+        "header",
+        "longer",
+        "emptied",
+        "other",
+        "renamed",
+    )
     for index in range(count):
         way = ways[index % len(ways)]
         if way == "cut":
             yield way, content[: int(rng.integers(1, len(content)))]
+        elif way == "renamed":
+            yield way, content
         elif way == "emptied":
             yield way, b""
         elif way == "other":

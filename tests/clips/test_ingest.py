@@ -79,6 +79,32 @@ def test_frames_are_resampled_by_the_sidecar_and_not_by_the_header(tmp_path):
         assert abs(times[chosen] - k / 10) <= 0.051
 
 
+def test_a_webm_of_uneven_times_that_states_no_rate(tmp_path):
+    """As a browser records: FFmpeg gives the clock's rate, 1000, and counts that many frames a second."""
+    path = write_raw(tmp_path / "clip.webm", pictures(250), 30.0, "VP80")
+    content = bytearray(path.read_bytes())
+    blocks = re.finditer(
+        rb"\xa3(?:[\x81-\xfe]|[\x40-\x7f].|[\x10-\x3f]..)\x81(..)[\x00\x80]", bytes(content), re.DOTALL
+    )
+    for index, block in enumerate(blocks):
+        (time,) = struct.unpack(">h", block[1])
+        struct.pack_into(">h", content, block.start(1), time + index * 7 % 13)
+    assert index == 249
+    rate = content.index(b"\x23\xe3\x83")  # DefaultDuration becomes an element of nothing
+    length = 2 + content[rate + 3] % 128
+    content[rate : rate + 2 + length] = bytes([0xEC, 0x80 | length]) + bytes(length)
+    path.write_bytes(content)
+    assert cv2.VideoCapture(str(path)).get(cv2.CAP_PROP_FPS) == 1000
+    clip = read_clip(path, LIMITS)
+    for k in (0, 40, 79):
+        assert min(np.abs(clip[k] - shrunk(pictures(250)[3 * k + d])).mean() for d in (0, 1)) < 6
+    longer = struct.unpack_from(">d", content, place := content.index(b"\x44\x89\x88") + 3)[0] * 1.2
+    struct.pack_into(">d", content, place, longer)
+    path.write_bytes(content)
+    with pytest.raises(Refused, match="250 of 300 frames can be decoded"):
+        read_clip(path, LIMITS)
+
+
 @pytest.mark.parametrize("name", ["clip.mp4", "clip.mov"])
 def test_a_clip_that_was_trimmed_without_being_written_anew_is_no_damaged_one(tmp_path, name):
     path = write_raw(tmp_path / name, pictures(300), 30.0, "mp4v")
@@ -228,8 +254,10 @@ def test_two_hundred_damaged_clips_are_judged(tmp_path, name, codec, count):
     """Structural damage is refused; what is accepted has 80 frames that decode and change."""
     content = write_raw(tmp_path / name, pictures(), codec=codec).read_bytes()
     accepted = 0
+    renamed = {".avi": ".mp4", ".mp4": ".mkv", ".mkv": ".avi"}
     for index, (way, altered) in enumerate(damaged(content, count, seed=1)):
-        file = f"{index:03d}{Path(name).suffix}"
+        suffix = Path(name).suffix
+        file = f"{index:03d}{renamed[suffix] if way == 'renamed' else suffix}"
         (tmp_path / file).write_bytes(altered)
         reason = judge(tmp_path, file, tmp_path / "work")
         if way in ("cut", "emptied", "other"):
@@ -255,6 +283,17 @@ def test_duplicates_and_halves_of_pairs_are_refused_but_singles_are_not():
         "a duplicate of c.avi",
         "",
     ]
+
+
+def test_a_manifest_of_uneven_rows_is_read_as_it_was_meant_or_refused(tmp_path):
+    (tmp_path / "a.avi").touch()
+    for row in ("a.avi,1,left,standard", "a.avi,1,left,standard,"):
+        (tmp_path / "manifest.csv").write_text(f"file,pair,camera,kind\n{row}\n")
+        (clip,) = read_candidates(tmp_path)
+        assert (clip.file, clip.pair, clip.camera, clip.kind) == ("a.avi", "1", "left", "standard")
+    (tmp_path / "manifest.csv").write_text("file,pair,camera,kind\na.avi,1,left,standard,more\n")
+    with pytest.raises(AnyviewError, match="a row has more cells than the first line has names"):
+        read_candidates(tmp_path)
 
 
 def test_a_folder_without_a_manifest_gets_one_proposed(tmp_path):

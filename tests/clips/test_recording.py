@@ -73,6 +73,16 @@ def test_two_views_are_filmed_at_once_and_ingest_takes_them(tmp_path, sources):
     assert "pair p1 is there already" in err
 
 
+def test_a_clip_that_a_kill_kept_out_of_the_manifest_is_in_nobodys_way(tmp_path, sources):
+    (tmp_path / "demo-001-left.avi").write_bytes(b"whole, but not listed")
+    arguments = ("record", ".", "--delay", "0", "--seconds", "1", "--camera", f"left={sources / 'a.mp4'}")
+    assert run(*arguments, cwd=tmp_path)[0] == 0
+    assert pd.read_csv(tmp_path / "manifest.csv")["pair"].tolist() == ["demo-002"]
+    code, _, err = run(*arguments, "--pair", "demo-001", cwd=tmp_path)
+    assert code == 2
+    assert "demo-001-left.avi: exists, but not in the manifest; delete it or choose another --pair" in err
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -1,5 +1,7 @@
 """The Gymnasium environments, by Gymnasium's own rules."""
 
+import subprocess
+import sys
 import warnings
 
 import gymnasium as gym
@@ -8,7 +10,8 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from anyview.sim.contexts import sample_contexts
-from anyview.sim.env import ENV_ID
+
+ENV_ID = "anyview/Pusher3DoF-v0"
 
 
 @pytest.mark.parametrize("control", ["twist", "torque"])
@@ -16,6 +19,12 @@ def test_check_env_passes_without_a_warning(control: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env(gym.make(ENV_ID, control=control, render_mode="rgb_array").unwrapped)
+
+
+def test_importing_the_package_is_enough() -> None:
+    code = f"import gymnasium, anyview; print(gymnasium.make({ENV_ID!r}).unwrapped)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "PusherEnv" in done.stdout
 
 
 def test_vector_environment_equals_single_ones_step_for_step() -> None:

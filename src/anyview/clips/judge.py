@@ -62,13 +62,22 @@ def _sidecar_times(path: Path) -> np.ndarray | None:
     return times
 
 
-def _decode(path: Path, sidecar: np.ndarray | None, shown: float, limits: Ingest) -> np.ndarray:
+def _decode(
+    path: Path, sidecar: np.ndarray | None, shown: float, limits: Ingest, measured: float | None = None
+) -> np.ndarray:
+    """Even frames; ``measured`` is the clip's rate where its container states none."""
     frames = np.empty((limits.frames, limits.size, limits.size, 3), np.uint8)
     filled = used = decoded = 0
     time = 0.0
     with open_capture(path) as (capture, messages):
         _check_picture_size(capture)
-        period = _source_period(capture, sidecar, limits.rate)
+        stated = capture.get(cv2.CAP_PROP_FPS)
+        if measured is None and not 0 < stated <= MAX_RATE:  # FFmpeg says how fast its clock ticks instead
+            times = np.fromiter(_grab_all(capture, sidecar, limits), float)
+            measured = (len(times) - 1) / times[-1] if len(times) > 1 and times[-1] > 0 else MAX_RATE
+            return _decode(path, sidecar, shown, limits, measured)
+        rate = measured or stated
+        period = min(1 / rate if sidecar is None else float(np.median(np.diff(sidecar))), 1 / limits.rate)
         for time in _grab_all(capture, sidecar, limits):
             decoded += 1
             while 0 < filled < limits.frames and time > filled / limits.rate + period:
@@ -78,6 +87,8 @@ def _decode(path: Path, sidecar: np.ndarray | None, shown: float, limits: Ingest
                 frames[filled] = _shrink(capture.retrieve()[1], limits.size)
                 filled, used = filled + 1, used + 1
         declared = shown * capture.get(cv2.CAP_PROP_FRAME_COUNT)
+        if measured and stated > 0:  # a count of ticks: the duration times that rate
+            declared *= measured / stated
         damage = messages.damage()
     if not decoded:
         raise Refused(f"damaged, or of a codec that is unknown here: {damage or 'no frame can be decoded'}")
@@ -124,14 +135,6 @@ def _grab_all(capture: cv2.VideoCapture, sidecar: np.ndarray | None, limits: Ing
         decoded, last, step = decoded + 1, time, time - last
     if sidecar is not None and decoded != len(sidecar):
         raise Refused(f"its sidecar lists {len(sidecar)} frames, the clip has {decoded}")
-
-
-def _source_period(capture: cv2.VideoCapture, times: np.ndarray | None, rate: float) -> float:
-    """Usual seconds between source frames, at most the output's period."""
-    if times is not None:
-        return min(float(np.median(np.diff(times))), 1 / rate)
-    fps = capture.get(cv2.CAP_PROP_FPS)
-    return min(1 / fps if fps > 0 else 0.0, 1 / rate)
 
 
 def _shrink(picture: np.ndarray, size: int) -> np.ndarray:

@@ -5,6 +5,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from itertools import count
 from pathlib import Path
 
 import cv2
@@ -121,9 +122,10 @@ def _open_device(index: int) -> cv2.VideoCapture:
 
 
 def free_pair(folder: Path) -> str:
-    """An id that no clip of the folder's manifest has: ``demo-001`` and so on."""
+    """An id that no clip of the folder has, listed in its manifest or not: ``demo-001`` and so on."""
     taken = set(_manifest(folder)["pair"])
-    return next(pair for number in range(1, len(taken) + 2) if (pair := f"demo-{number:03d}") not in taken)
+    pairs = (f"demo-{number:03d}" for number in count(1))
+    return next(pair for pair in pairs if pair not in taken and not any(folder.glob(f"{pair}-*")))
 
 
 def check_place(folder: Path, pair: str, kind: str, names: Sequence[str]) -> None:
@@ -139,7 +141,7 @@ def check_place(folder: Path, pair: str, kind: str, names: Sequence[str]) -> Non
         raise AnyviewError(f"{folder / 'manifest.csv'}: pair {pair} is there already; choose another --pair")
     for name in names:
         if (path := folder / f"{pair}-{name}.avi").exists():
-            raise AnyviewError(f"{path}: exists already; choose another --pair")
+            raise AnyviewError(f"{path}: exists, but not in the manifest; delete it or choose another --pair")
 
 
 def film(

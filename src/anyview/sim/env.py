@@ -22,7 +22,6 @@ from anyview.sim.batch import (
 )
 from anyview.sim.contexts import Context, Kind, sample_contexts
 
-ENV_ID = "anyview/Pusher3DoF-v0"
 _OBSERVATION_SPACE = gym.spaces.Box(-OBSERVATION_LIMIT, OBSERVATION_LIMIT, (OBSERVATION_SIZE,), np.float32)
 _ACTION_SPACE = gym.spaces.Box(-1.0, 1.0, (ACTION_SIZE,), np.float32)
 _METADATA = {"render_modes": ["rgb_array"], "render_fps": 10}
@@ -143,10 +142,3 @@ def _draw(rng: np.random.Generator, kind: Kind) -> Context:
 def _info(batch: PusherBatch, index: int) -> dict[str, Any]:
     distance = float(batch.distance()[index])
     return {"distance": distance, "is_success": distance < TOLERANCE}
-
-
-gym.register(
-    ENV_ID,
-    entry_point="anyview.sim.env:PusherEnv",
-    vector_entry_point="anyview.sim.env:PusherVectorEnv",
-)
