@@ -3,8 +3,9 @@
 - environment steps per second, updates included, summed over 15 runs: ours in two groups on two cores,
   against Stable-Baselines3 training runs one after another, with one thread or all, whichever is faster. Both
   have the same environment, translated reward, network, batch and number of updates;
-- one core's time in a lockstep step of a group of 8: physics, rendering, reward, acting and keeping, updates,
-  each beside its floor: the matrix products of updates and encoder alone, at the rate of a large product.
+- one core's time in a lockstep step of a group of 8, each part beside its floor: acting, encoder and updates,
+  their matrix products at the rate of a large one; physics, MuJoCo's steps alone; rendering, a picture of
+  nothing (clear, read back, average); replay, its bytes at the rate of a large copy.
 
 The translator has random weights: its speed is that of a trained one. Run it on an idle machine.
 
@@ -17,6 +18,7 @@ from collections.abc import Callable
 from contextlib import contextmanager
 from itertools import pairwise
 
+import cv2
 import numpy as np
 import torch
 
@@ -26,12 +28,15 @@ from anyview.imitation.gym_env import TranslatedReward
 from anyview.imitation.methods import Group, make_learner
 from anyview.imitation.rewards import DemonstrationReward, translate_demonstrations
 from anyview.runtime.workers import run_units
-from anyview.sim.batch import ACTIONS, PusherBatch
+from anyview.sim.batch import ACTION_SIZE, ACTIONS, OBSERVATION_SIZE, PusherBatch
 from anyview.sim.contexts import Context, sample_contexts
 from anyview.sim.env import PusherEnv
 from anyview.sim.expert import roll_out
 from anyview.sim.render import renderer
+from anyview.sim.scene import SUBSTEPS, model
 from anyview.translation.network import ContextTranslator
+
+import mujoco.batch  # isort: skip  (after anyview.sim, which chooses the OpenGL backend)
 
 RUNS, EPISODES, ROUNDS = 15, 4, 3
 
@@ -55,10 +60,24 @@ class Stopwatch:
         self.parts: dict[str, float] = {}
 
     @contextmanager
-    def part(self, name: str):
+    def part(self, name: str, within: str | None = None):
+        """Count for ``name``, and no longer for the part ``within`` which this one lies."""
         started = time.perf_counter()
         yield
-        self.parts[name] = self.parts.get(name, 0.0) + time.perf_counter() - started
+        spent = time.perf_counter() - started
+        for part, share in ((name, spent), (within, -spent)):
+            if part is not None:
+                self.parts[part] = self.parts.get(part, 0.0) + share
+
+    def follow(self, owner: object, method: str, name: str, within: str) -> None:
+        """Count the calls of ``owner``'s ``method`` for ``name``."""
+        wrapped = getattr(owner, method)
+
+        def timed(*arguments):
+            with self.part(name, within):
+                return wrapped(*arguments)
+
+        setattr(owner, method, timed)
 
 
 def train_group(params: Params, runs: range, contexts: list[Context]) -> tuple[int, Stopwatch]:
@@ -70,12 +89,16 @@ def train_group(params: Params, runs: range, contexts: list[Context]) -> tuple[i
     targets = translate_demonstrations(model, clips[:2], first)
     reward = DemonstrationReward(model, *targets, first, params.imitation.reward)
     pushers, watch = PusherBatch(contexts, image_size=params.sim.image_size), Stopwatch()
+    for method in ("_transitions", "_sample"):
+        watch.follow(learner, method, "replay", within="updates")
+    for method in ("add", "take"):
+        watch.follow(learner._replay, method, "replay", within="updates")
     for episode in range(EPISODES + 1):
         if episode == 1:
-            watch = Stopwatch()
+            watch.parts.clear()
         observations = pushers.reset()[:, None]
         for step in range(1, ACTIONS + 1):
-            with watch.part("acting and keeping"):
+            with watch.part("acting"):
                 actions = learner.act(observations, explore=True)
             with watch.part("physics"):
                 following = pushers.step(actions[:, 0])[:, None]
@@ -83,7 +106,7 @@ def train_group(params: Params, runs: range, contexts: list[Context]) -> tuple[i
                 frames = pushers.render()
             with watch.part("reward (encoder)"):
                 rewards = reward.step(frames[:, None], step)
-            with watch.part("acting and keeping"):
+            with watch.part("replay"):
                 learner.record(observations, actions, rewards, following, step)
             observations = following
         with watch.part("updates"):
@@ -133,23 +156,53 @@ def seconds(work: Callable[[], object], repeats: int = 30) -> float:
     return float(np.median(times))
 
 
+def empty_picture(size: int) -> Callable[[], object]:
+    """Draw a picture of nothing as the renderer draws one: clear, read back, average."""
+    nothing = mujoco.MjModel.from_xml_string("<mujoco/>")
+    pixels = np.empty((size, size, 3), np.uint8)
+    surface = mujoco.GLContext(size, size)
+    surface.make_current()
+    nothing.vis.global_.offwidth = nothing.vis.global_.offheight = size
+    context = mujoco.MjrContext(nothing, mujoco.mjtFontScale.mjFONTSCALE_100)
+    mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, context)
+    scene, rect = mujoco.MjvScene(nothing, maxgeom=1), mujoco.MjrRect(0, 0, size, size)
+    for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_SKYBOX):
+        scene.flags[flag] = 0
+
+    def draw() -> None:
+        surface.make_current()
+        mujoco.mjr_render(rect, scene, context)
+        mujoco.mjr_readPixels(pixels, None, rect, context)
+        cv2.resize(pixels[::-1], (size // 2, size // 2), interpolation=cv2.INTER_AREA)
+
+    return draw
+
+
 def floors(params: Params) -> dict[str, float]:
-    """Seconds of a lockstep step of 8 runs that encoder and updates take at a large product's rate."""
+    """Least seconds of each part of a lockstep step of 8 runs, as the module's text defines them."""
     torch.set_num_threads(1)
-    square = torch.randn(512, 512)
+    square, memory = torch.randn(512, 512), torch.zeros(1 << 24)
     rate = 2 * 512**3 / seconds(lambda: square @ square)
+    copying = 4 * len(memory) / seconds(memory.clone)
     size, channels = params.sim.image_size, (3, 16, 32, 64, 128)
     encoder = sum(
         2 * 25 * before * after * (size >> (layer + 1)) ** 2
         for layer, (before, after) in enumerate(pairwise(channels))
     )
     ddpg = params.imitation.ddpg
-    widths = [18 + ddpg.time_bumps, *ddpg.hidden, 1]
-    network = 2 * ddpg.batch_size * sum(a * b for a, b in pairwise(widths))
+    widths = [OBSERVATION_SIZE + ACTION_SIZE + ddpg.time_bumps, *ddpg.hidden, 1]
+    network = 2 * sum(a * b for a, b in pairwise(widths))
+    row = 4 * (2 * OBSERVATION_SIZE + ACTION_SIZE + 2)
+    pushers = mujoco.batch.Batch(model("twist"), nsim=8, nthread=1)
+    picture = empty_picture(2 * size)
     # Per update, in passes: targets 2, critic 3 (its backward counts 2), policy 3 and through the critic 2.
     return {
+        "acting": 8 * network / rate,
+        "physics": seconds(lambda: pushers.step(nstep=SUBSTEPS)),
+        "rendering": 8 * seconds(picture, 200),
         "reward (encoder)": 8 * encoder / rate,
-        "updates": ddpg.updates_per_step * 8 * 10 * network / rate,
+        "replay": 8 * ddpg.updates_per_step * ddpg.batch_size * row / copying,
+        "updates": 8 * ddpg.updates_per_step * 10 * ddpg.batch_size * network / rate,
     }
 
 
@@ -176,8 +229,8 @@ def main() -> None:
     lowest, whole = floors(params), sum(watch.parts.values())
     print("a lockstep step of 8 runs on one core:")
     for name, spent in sorted(watch.parts.items(), key=lambda part: -part[1]):
-        floor = f", floor {1000 * lowest[name]:.2f} ms" if name in lowest else ""
-        print(f"  {name:20} {1000 * 8 * spent / steps:6.2f} ms {100 * spent / whole:4.0f}%{floor}")
+        taken = f"{1000 * 8 * spent / steps:6.2f} ms {spent / whole:4.0%}"
+        print(f"  {name:20} {taken}, floor {1000 * lowest[name]:.3f} ms")
 
 
 if __name__ == "__main__":
