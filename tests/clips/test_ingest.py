@@ -426,6 +426,22 @@ def test_endless_nesting_is_refused(tmp_path, name):
     assert judge(tmp_path, name, tmp_path / "out") == "damaged: nested too deeply"
 
 
+def test_a_table_of_more_parts_than_a_clip_can_have_is_refused_unread(tmp_path):
+    path = write_raw(tmp_path / "clip.mp4", pictures(), codec="mp4v")
+    content = bytearray(path.read_bytes())
+    struct.pack_into(">I", content, content.index(b"stsz") + 12, 200_001)
+    path.write_bytes(content)
+    with pytest.raises(Refused, match="damaged: too many parts"):
+        read_clip(path, LIMITS)
+
+
+def test_a_giant_sidecar_is_refused_unread(tmp_path):
+    path = write_raw(tmp_path / "clip.avi", pictures())
+    (tmp_path / "clip.times.csv").write_text("seconds\n" + "0.1\n" * 300_000)
+    with pytest.raises(Refused, match="too large for a clip's times"):
+        read_clip(path, LIMITS)
+
+
 def test_a_sidecar_of_giant_numbers_is_refused(tmp_path):
     write_raw(tmp_path / "clip.avi", pictures())
     (tmp_path / "clip.times.csv").write_text("seconds\n" + "9" * 400 + "\n" + "9" * 401 + "\n")

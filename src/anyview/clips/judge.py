@@ -15,6 +15,7 @@ from anyview.runtime.errors import AnyviewError
 
 LONGEST = 1.5  # a raw clip may be this many times as long as a finished one
 MAX_RATE = 250.0  # frames a second
+LARGEST_SIDECAR = 2**20  # bytes, tens of thousands of times
 PATIENCE = 120.0  # seconds of decoding, a hundred times what a clip takes
 LONGEST_GAP = 2.5  # output periods without a source frame
 MAX_REPEATS = 0.1  # of a clip's frames may show their predecessor again: the camera was a little slow
@@ -53,6 +54,8 @@ def _sidecar_times(path: Path) -> np.ndarray | None:
     sidecar = path.with_name(times_file(path.name))
     if not sidecar.is_file():
         return None
+    if sidecar.stat().st_size > LARGEST_SIDECAR:
+        raise Refused(f"{sidecar.name}: too large for a clip's times")
     try:
         times = read_table(sidecar, ["seconds"])["seconds"].to_numpy(float)
     except (AnyviewError, ValueError, OverflowError):
