@@ -133,6 +133,7 @@ def test_clean_empties_the_scratch_folder(here, scratch):
     done = anyview(here, "clean")
     assert done.stdout == f"{scratch}: 3 MB freed\n"
     assert not (scratch / "frames").exists()
+    assert json.loads(anyview(here, "clean", "--json").stdout) == {"scratch": str(scratch), "freed_bytes": 0}
 
 
 def test_the_console_script_is_the_same_program(here):

@@ -155,11 +155,15 @@ def profile(
 
 
 @app.command()
-def clean() -> None:
+def clean(as_json: Annotated[bool, typer.Option("--json", help="Print JSON for a script.")] = False) -> None:
     """Empty the scratch folder: checkpoints and decoded frames, which stages make again."""
     from anyview.runtime.scratch import clear_scratch, scratch_root
 
-    print(f"{scratch_root()}: {clear_scratch() / 1e6:.0f} MB freed")
+    folder, freed = scratch_root(), clear_scratch()
+    if as_json:
+        print(json.dumps({"scratch": str(folder), "freed_bytes": freed}))
+    else:
+        print(f"{folder}: {freed / 1e6:.0f} MB freed")
 
 
 def _load(name: str) -> Any:

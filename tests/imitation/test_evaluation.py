@@ -126,6 +126,10 @@ def test_watch_plays_a_policy(study: Path, root: Path) -> None:
         assert ran.returncode == 2
         assert complaint in ran.stderr
         assert "Traceback" not in ran.stderr
+    command[4] = "theirs"
+    ran = subprocess.run(command, cwd=study, capture_output=True, text=True)
+    assert ran.returncode == 2
+    assert "theirs: no such method was evaluated; there are " in ran.stderr
 
 
 def test_an_interrupted_group_ends_with_the_same_results(

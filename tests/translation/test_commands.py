@@ -1,5 +1,6 @@
 """The stages and `anyview translate`, as a user runs them."""
 
+import json
 import struct
 import subprocess
 import sys
@@ -95,6 +96,11 @@ def test_translating_a_clip_of_ones_own(footage):
     clip, view = disc_clips(2, length=9)
     assert np.array_equal(read_video(Path("out.avi")), translate_clip(model, clip, view[0]))
     assert cv2.VideoCapture("out.avi").get(cv2.CAP_PROP_FPS) == pytest.approx(15)
+    again = run(
+        "-m", "anyview", "translate", "clip.avi", "--context", "view.png", "--model", "mine", "--json"
+    )
+    assert json.loads(again.stdout) == {"output": "translated.avi", "frames": 9, "size": 16, "rate": 15.0}
+    assert Path("translated.avi").read_bytes() == Path("out.avi").read_bytes()
 
 
 def test_bad_footage_is_refused_in_one_line(footage):

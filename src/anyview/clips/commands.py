@@ -81,6 +81,8 @@ def clips(
     from anyview.clips.overview import lines, survey
     from anyview.config import load_params
 
+    if sheet is not None and sheet.suffix.lower() != ".png":
+        raise AnyviewError(f"{sheet}: a contact sheet is a .png file")
     found = survey(load_params().real.source)
     print(json.dumps(found, indent=2) if as_json else "\n".join(lines(found)))
     if sheet is not None:
@@ -92,8 +94,6 @@ def _write_sheet(path: Path) -> None:
     from anyview.clips.pictures import contact_sheet, write_png
     from anyview.clips.store import open_frames
 
-    if path.suffix.lower() != ".png":
-        raise AnyviewError(f"{path}: a contact sheet is a .png file")
     store = open_frames(Path("data/real/clips"))
     labels = [f"{row.clip} {row.kind}" for row in store.manifest.itertuples()]
     write_png(path, contact_sheet(list(store.frames), labels))

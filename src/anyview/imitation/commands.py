@@ -8,6 +8,7 @@ import typer
 
 from anyview.clips.video import Codec
 
+POLICIES = Path("data/policies")
 CODECS: dict[str, Codec] = {".mp4": "XVID", ".avi": "FFV1"}
 
 
@@ -32,7 +33,10 @@ def watch(
         raise AnyviewError(f"{output}: the output must end in {' or '.join(CODECS)}")
     if size % 2:
         raise AnyviewError(f"--size {size}: must be even")
-    policy = load_policy(Path("data/policies") / cell, run)
+    if not (POLICIES / cell).is_dir():
+        there = ", ".join(sorted(folder.name for folder in POLICIES.glob("*/"))) or "none; run `dvc repro`"
+        raise AnyviewError(f"{cell}: no such method was evaluated; there are {there}")
+    policy = load_policy(POLICIES / cell, run)
     pusher = PusherBatch([policy.context], policy.control, size)
     observation = pusher.reset()[0]
     frames = [pusher.render()[0]]

@@ -1,5 +1,6 @@
 """The command `anyview translate`."""
 
+import json
 from pathlib import Path
 from typing import Annotated
 
@@ -13,7 +14,10 @@ def translate(
         typer.Option("--context", help="The other view: a picture, or a video whose first frame is taken."),
     ],
     model: Annotated[Path, typer.Option("--model", help="A trained cell, or the folder of a model.")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="The AVI file to write (lossless FFV1).")],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="The AVI file to write (lossless FFV1).")
+    ] = Path("translated.avi"),
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for a script.")] = False,
 ) -> None:
     """Translate a clip to another viewpoint.
 
@@ -34,4 +38,8 @@ def translate(
     view = read_view(context, translator.image_size)
     translated = translate_clip(translator.to(torch_device()), frames, view)
     write_video(output, translated, rate)
-    print(f"{output}: {len(translated)} frames of {translator.image_size}x{translator.image_size}")
+    count, size = translated.shape[:2]
+    if as_json:
+        print(json.dumps({"output": str(output), "frames": count, "size": size, "rate": rate}))
+    else:
+        print(f"{output}: {count} frames of {size}x{size}")
