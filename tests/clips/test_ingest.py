@@ -285,14 +285,15 @@ def test_duplicates_and_halves_of_pairs_are_refused_but_singles_are_not():
     ]
 
 
-def test_a_manifest_of_uneven_rows_is_read_as_it_was_meant_or_refused(tmp_path):
-    (tmp_path / "a.avi").touch()
-    for row in ("a.avi,1,left,standard", "a.avi,1,left,standard,"):
-        (tmp_path / "manifest.csv").write_text(f"file,pair,camera,kind\n{row}\n")
-        (clip,) = read_candidates(tmp_path)
-        assert (clip.file, clip.pair, clip.camera, clip.kind) == ("a.avi", "1", "left", "standard")
-    (tmp_path / "manifest.csv").write_text("file,pair,camera,kind\na.avi,1,left,standard,more\n")
-    with pytest.raises(AnyviewError, match="a row has more cells than the first line has names"):
+@pytest.mark.parametrize(
+    ("row", "cells"), [("a.avi,1,left,standard,", 5), ("a.avi,1,left", 3), ('"a.avi,1",left,standard', 3)]
+)
+def test_a_row_of_a_manifest_with_a_comma_too_many_or_too_few_is_named(tmp_path, row, cells):
+    (tmp_path / "manifest.csv").write_text(f"file,pair,camera,kind\nb.avi,2,left,standard\n\n{row}\n")
+    with pytest.raises(AnyviewError, match=rf"manifest\.csv: .*line 4(,| has| saw)* {cells}"):
+        read_candidates(tmp_path)
+    (tmp_path / "manifest.csv").write_text("file,pair,camera,kind\na.avi,1,left,standard,\n")
+    with pytest.raises(AnyviewError, match=r"manifest\.csv: line 2 has 5 cells, the first has 4"):
         read_candidates(tmp_path)
 
 

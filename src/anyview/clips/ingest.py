@@ -12,7 +12,8 @@ from typing import Any
 import pandas as pd
 
 from anyview.clips.judge import Refused, read_clip
-from anyview.clips.manifests import KINDS, RAW_COLUMNS, propose_manifest, read_table, times_file
+from anyview.clips.manifests import KINDS, propose_manifest, times_file
+from anyview.clips.raw_manifest import read_raw_manifest
 from anyview.clips.store import StoredFile, write_clips, write_set
 from anyview.config import Ingest
 from anyview.runtime.errors import AnyviewError
@@ -56,7 +57,7 @@ def read_candidates(source: Path) -> list[Candidate]:
         raise AnyviewError(f"{path}: no such file; check manifest.proposed.csv beside it and rename it")
     candidates: list[Candidate] = []
     taken: Counter[str] = Counter()
-    for row in read_table(path, RAW_COLUMNS).to_dict("records"):
+    for row in read_raw_manifest(path).to_dict("records"):
         stem = _slug(row["file"])
         taken[stem.lower()] += 1
         clip = stem if taken[stem.lower()] == 1 else f"{stem}~{taken[stem.lower()]}"

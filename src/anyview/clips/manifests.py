@@ -1,7 +1,6 @@
 """Manifests: CSV tables that list clips, one a row; and the sidecars with the times of a clip's frames."""
 
 import re
-import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -39,14 +38,8 @@ def read_table(path: Path, columns: Sequence[str], unique: str | None = None) ->
 
     Raises AnyviewError naming the file when it is missing, no such table, or repeats a value of ``unique``.
     """
-    text = dict.fromkeys(_TEXT, str)
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", pd.errors.ParserWarning)
-            # Without an index, or a comma at the end of each row would shift its cells.
-            table = pd.read_csv(path, dtype=text, keep_default_na=False, index_col=False, encoding="utf-8")
-    except pd.errors.ParserWarning:
-        raise AnyviewError(f"{path}: a row has more cells than the first line has names") from None
+        table = pd.read_csv(path, dtype=dict.fromkeys(_TEXT, str), keep_default_na=False, encoding="utf-8")
     except FileNotFoundError:
         raise AnyviewError(f"{path}: no such file") from None
     except (ValueError, OverflowError) as error:  # pandas' parser and encoding errors are ValueErrors
@@ -57,7 +50,7 @@ def read_table(path: Path, columns: Sequence[str], unique: str | None = None) ->
     if unique is not None and table[unique].duplicated().any():
         repeated = table[unique][table[unique].duplicated()].iloc[0]
         raise AnyviewError(f"{path}: {unique} {repeated} is listed twice")
-    return table.fillna(dict.fromkeys(set(_TEXT) & set(table.columns), ""))  # cells that a short row lacks
+    return table
 
 
 def times_file(file: str) -> str:

@@ -13,7 +13,8 @@ import numpy as np
 import pandas as pd
 
 from anyview.clips.ffmpeg import listening
-from anyview.clips.manifests import KINDS, RAW_COLUMNS, read_table, times_file
+from anyview.clips.manifests import KINDS, RAW_COLUMNS, times_file
+from anyview.clips.raw_manifest import read_raw_manifest
 from anyview.clips.video import VideoWriter, open_capture
 from anyview.runtime.errors import AnyviewError
 from anyview.runtime.outputs import write_atomically
@@ -212,4 +213,4 @@ def _check_pace(camera: Camera, stamps: list[float]) -> None:
 
 def _manifest(folder: Path) -> pd.DataFrame:
     path = folder / "manifest.csv"
-    return read_table(path, RAW_COLUMNS) if path.exists() else pd.DataFrame(columns=list(RAW_COLUMNS))
+    return read_raw_manifest(path) if path.exists() else pd.DataFrame(columns=list(RAW_COLUMNS))

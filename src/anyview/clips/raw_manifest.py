@@ -1,0 +1,27 @@
+"""The manifest of raw clips, written by hand as often as by `anyview record`."""
+
+import csv
+from pathlib import Path
+
+import pandas as pd
+
+from anyview.clips.manifests import RAW_COLUMNS, read_table
+from anyview.runtime.errors import AnyviewError
+
+
+def read_raw_manifest(path: Path) -> pd.DataFrame:
+    """The rows of ``path``, a CSV table of ``RAW_COLUMNS``.
+
+    Raises AnyviewError as ``read_table`` does, and for a row with more or fewer cells than the first line:
+    one comma too many would give every cell to its neighbour's column.
+    """
+    table = read_table(path, RAW_COLUMNS)
+    with path.open(newline="", encoding="utf-8-sig") as lines:
+        rows = csv.reader(lines)
+        names = len(next(rows))
+        for row in rows:
+            if row and len(row) != names:
+                raise AnyviewError(
+                    f"{path}: line {rows.line_num} has {len(row)} cells, the first has {names}"
+                )
+    return table
