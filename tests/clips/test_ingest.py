@@ -297,6 +297,12 @@ def test_a_row_of_a_manifest_with_a_comma_too_many_or_too_few_is_named(tmp_path,
         read_candidates(tmp_path)
 
 
+def test_a_cell_that_no_name_is_as_long_as_is_told(tmp_path):
+    (tmp_path / "manifest.csv").write_text(f"file,pair,camera,kind\na.avi,{'1' * 200_000},left,standard\n")
+    with pytest.raises(AnyviewError, match=r"manifest\.csv: not a CSV table: field larger than"):
+        read_candidates(tmp_path)
+
+
 def test_a_folder_without_a_manifest_gets_one_proposed(tmp_path):
     names = [
         "day1/push-left.mp4",

@@ -16,12 +16,16 @@ def read_raw_manifest(path: Path) -> pd.DataFrame:
     one comma too many would give every cell to its neighbour's column.
     """
     table = read_table(path, RAW_COLUMNS)
-    with path.open(newline="", encoding="utf-8-sig") as lines:
-        rows = csv.reader(lines)
-        names = len(next(rows))
-        for row in rows:
-            if row and len(row) != names:
-                raise AnyviewError(
-                    f"{path}: line {rows.line_num} has {len(row)} cells, the first has {names}"
-                )
+    names = 0
+    try:
+        with path.open(newline="", encoding="utf-8") as lines:
+            rows = csv.reader(lines)
+            for row in rows:
+                names = names or len(row)
+                if row and len(row) != names:
+                    raise AnyviewError(
+                        f"{path}: line {rows.line_num} has {len(row)} cells, the first has {names}"
+                    )
+    except csv.Error as error:
+        raise AnyviewError(f"{path}: not a CSV table: {error}") from None
     return table
