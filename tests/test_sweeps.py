@@ -54,13 +54,18 @@ def test_a_number_of_a_reward_reruns_the_cells_that_read_it(study, key, value, r
     path.write_text(before)
     expected = cells(study, reads=reads)
     assert len(expected) == count
-    assert {line.split("'")[1] for line in said if line.startswith("Running stage")} == {*expected, "report"}
+    assert {line.split("'")[1] for line in said if line.startswith("Running stage")} == {
+        "check",
+        *expected,
+        "report",
+    }
 
 
 def test_a_weight_of_a_loss_reruns_its_translator_and_what_follows(study):
     key = "translation.cells.sim-no-alignment.weights.reconstruction"
     study.run("dvc", "exp", "run", "-S", f"{key}=0.5")
     assert reran(study) == {
+        "check",
         "train@sim-no-alignment",
         "translate@sim-no-alignment",
         *cells(study, source="data/models/sim-no-alignment"),
@@ -73,14 +78,32 @@ def test_a_weight_of_a_loss_reruns_its_translator_and_what_follows(study):
     study.run("dvc", "checkout")
 
 
-def test_a_queue_of_one_method_and_the_report(study):
-    command = ("dvc", "exp", "run", "--queue", "-S", "imitation.reward.phi=0.01,0.1,1")
-    study.run(*command, "--single-item", "imitate@ours", "report")
+def work_off_the_queue(study: Study) -> str:
+    """Start the queue and wait for its end; its last status."""
     study.run("bash", "-c", "dvc queue start > queue.log 2>&1")
     deadline = time.monotonic() + 900
     while "Queued" in (status := study.run("dvc", "queue", "status")) or "Running" in status:
         assert time.monotonic() < deadline, status
         time.sleep(5)
+    return status
+
+
+def test_a_queue_of_the_whole_pipeline_runs_what_reads_phi(study):
+    study.run("dvc", "exp", "run", "--queue", "-S", "imitation.reward.phi=0.3")
+    assert work_off_the_queue(study).count("Success") == 1
+    told = json.loads(study.run("anyview", "sweep", "imitation.reward.phi", "--json"))
+    (found,) = (trial["experiment"] for trial in told["trials"] if trial["value"] == 0.3)
+    study.run("dvc", "exp", "apply", found)
+    assert reran(study) == {"check", *cells(study, reads="reward"), "report"}
+    study.run("git", "checkout", ".")
+    study.run("dvc", "checkout")
+    study.run("dvc", "queue", "remove", "--success")
+
+
+def test_a_queue_of_one_method_and_the_report(study):
+    command = ("dvc", "exp", "run", "--queue", "-S", "imitation.reward.phi=0.01,0.1,1")
+    study.run(*command, "--single-item", "imitate@ours", "report")
+    status = work_off_the_queue(study)
     assert status.count("Success") == 3, status
     told = json.loads(study.run("anyview", "sweep", "imitation.reward.phi", "--json"))
     found = {trial["value"]: trial["experiment"] for trial in told["trials"]}
