@@ -99,7 +99,8 @@ def _sorted(followers: Edges) -> list[str]:
 
 
 def draw(stages: list[Stage]) -> str:
-    """The stages as an SVG element, top to bottom; colours come from the page's style sheet."""
+    """The stages that make something as an SVG element, top to bottom; the page's style sheet colours it."""
+    stages = [stage for stage in stages if stage.outputs]
     edges = needed_edges(stages)
     # A stage stands right above its first follower: then few arrows pass behind another box.
     above_end: dict[str, int] = {}
