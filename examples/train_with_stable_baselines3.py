@@ -14,6 +14,7 @@ from stable_baselines3 import SAC
 from anyview.config import load_params
 from anyview.imitation.demonstrations import imitated_demonstrations
 from anyview.imitation.gym_env import TranslatedReward
+from anyview.runtime.errors import exit_code
 from anyview.runtime.seeds import stream
 from anyview.sim.contexts import sample_contexts
 from anyview.sim.env import PusherEnv
@@ -42,4 +43,4 @@ def main(steps: int) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 10_000)
+    sys.exit(exit_code(lambda: main(int(sys.argv[1]) if len(sys.argv) > 1 else 10_000)))

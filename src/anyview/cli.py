@@ -137,7 +137,8 @@ def profile(
         active = profiles.active_profile()
         differing = profiles.differences(name or active or profiles.DEFAULT)
         if as_json:
-            print(json.dumps({"active": active, "profiles": profiles.profile_names()}))
+            names = profiles.profile_names()
+            print(json.dumps({"active": active, "profiles": names, "differences": differing}))
         else:
             print(f"active profile: {active or 'none'}")
             for key, (present, expected) in differing.items():

@@ -120,6 +120,12 @@ class SplitReal(Block):
     train: CountOrFraction = Field(description="clips to train on: a count, or a fraction such as 0.85")
     validation: CountOrFraction = Field(description="clips held out: a count, or a fraction")
 
+    @model_validator(mode="after")
+    def _fractions_of_one_whole(self) -> "SplitReal":
+        if self.train < 1 and self.validation < 1 and self.train + self.validation > 1:
+            raise ValueError("the fractions train and validation sum to more than 1")
+        return self
+
 
 class Split(Block):
     """Stage `split`."""
@@ -347,14 +353,29 @@ def read_yaml(path: Path) -> Any:
 def parse_params(values: Any, name: str = "params.yaml") -> Params:
     """Check ``values``; the first impossible key is named, with every other one counted."""
     try:
-        return Params.model_validate(values)
+        params = Params.model_validate(values)
     except ValidationError as error:
         raise AnyviewError(f"{name}: {_explain(error)}") from None
+    for key, cell in params.imitation.cells.items():
+        if cell.source not in (fitting := _sources(cell, params.translation)):
+            raise AnyviewError(
+                f"{name}: imitation.cells.{key}.source: for the reward {cell.reward} it must be "
+                f"{' or '.join(fitting)}, got {_brief(cell.source)}"
+            )
+    return params
 
 
 def load_params(path: Path = Path("params.yaml")) -> Params:
     """Read and check ``params.yaml``."""
     return parse_params(read_yaml(path), str(path))
+
+
+def _sources(cell: ImitationCell, translation: Translation) -> list[str]:
+    """What the reward of ``cell`` can be made from."""
+    if cell.reward in _LEARNED:
+        return [f"src/anyview/imitation/{cell.reward}.py"]
+    method = "time-contrastive" if cell.reward == "embedding" else "translator"
+    return [f"data/models/{key}" for key, model in translation.cells.items() if model.method == method]
 
 
 def _explain(error: ValidationError) -> str:

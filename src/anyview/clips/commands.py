@@ -40,8 +40,10 @@ def record(
     To use the clips, set real.source: recorded in params.yaml.
     """
     from anyview.clips import recording
+    from anyview.clips.judge import LONGEST
     from anyview.clips.pictures import write_png
     from anyview.clips.preview import serving
+    from anyview.config import load_params
     from anyview.runtime.progress import track
 
     named = [_parse_camera(text) for text in camera or ["left=0"]]
@@ -69,6 +71,11 @@ def record(
         print("interrupted: no clip was kept", file=sys.stderr)
         raise
     print(f"{', '.join(path.name for path in paths)}: added to {folder / 'manifest.csv'}")
+    if Path("params.yaml").is_file():
+        wanted = load_params().real.ingest
+        least, most = wanted.frames / wanted.rate, LONGEST * wanted.frames / wanted.rate
+        if not least <= seconds <= most:
+            print(f"note: stage ingest takes clips of {least:g} to {most:g} s (real.ingest in params.yaml)")
 
 
 def clips(
@@ -78,12 +85,12 @@ def clips(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON for a script.")] = False,
 ) -> None:
     """List the clips that there are, by kind, split and source, and the refused with the reason."""
-    from anyview.clips.overview import lines, survey
+    from anyview.clips.overview import ingested_source, lines, survey
     from anyview.config import load_params
 
     if sheet is not None and sheet.suffix.lower() != ".png":
         raise AnyviewError(f"{sheet}: a contact sheet is a .png file")
-    found = survey(load_params().real.source)
+    found = survey(ingested_source() or load_params().real.source)
     print(json.dumps(found, indent=2) if as_json else "\n".join(lines(found)))
     if sheet is not None:
         _write_sheet(sheet)

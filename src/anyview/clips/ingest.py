@@ -20,6 +20,8 @@ from anyview.runtime.errors import AnyviewError
 from anyview.runtime.once import once, sha256
 from anyview.runtime.outputs import write_atomically
 
+EXTREME = KINDS[-1]  # clips of scenes that training never sees
+
 
 @dataclass(frozen=True)
 class Candidate:
@@ -48,7 +50,9 @@ def read_candidates(source: Path) -> list[Candidate]:
     """
     path = source / "manifest.csv"
     if not source.is_dir():
-        raise AnyviewError(f"{source}: no such folder; fill it with `anyview record` or your own clips")
+        raise AnyviewError(
+            f"{source}: no such folder; `anyview record` fills data/real/raw, `dvc repro film` the surrogate"
+        )
     if not path.exists():
         proposal = propose_manifest(source)
         if proposal.empty:
@@ -123,15 +127,21 @@ def _locate(source: Path, candidate: Candidate) -> Path:
 
 
 def settle(candidates: Sequence[Candidate], verdicts: Sequence[Verdict]) -> list[Verdict]:
-    """The final verdicts: duplicates of earlier clips are refused, and views whose pair lost its other one.
+    """The final verdicts: duplicates of earlier clips are refused, pairs of which one view alone is extreme,
+    and views whose pair lost its other one.
 
     A clip whose pair is named once is a single, as declared.
     """
     first: dict[str, str] = {}
+    extreme: dict[str, set[bool]] = {}
+    for candidate in candidates:
+        extreme.setdefault(candidate.pair, set()).add(candidate.kind == EXTREME)
     settled = []
     for candidate, verdict in zip(candidates, verdicts, strict=True):
         if not verdict.reason and verdict.pictures in first:
             verdict = Verdict(f"a duplicate of {first[verdict.pictures]}")
+        elif not verdict.reason and len(extreme[candidate.pair]) > 1:
+            verdict = Verdict(f"only one view of its pair is called {EXTREME}")
         first.setdefault(verdict.pictures, candidate.file)
         settled.append(verdict)
     declared = Counter(candidate.pair for candidate in candidates)

@@ -8,6 +8,8 @@ import pandas as pd
 
 from anyview.clips.manifests import KINDS, RAW_COLUMNS, read_table
 from anyview.clips.splits import SPLITS, read_split
+from anyview.config import read_yaml
+from anyview.runtime.errors import AnyviewError
 
 UNUSED = "unused"
 _RAW = {"surrogate": Path("data/real/surrogate"), "recorded": Path("data/real/raw")}
@@ -32,6 +34,14 @@ def survey(source: str) -> dict[str, Any]:
     return {"source": source, "raw": raw, "sets": sets, "kinds": kinds, "refused": refused}
 
 
+def ingested_source() -> str | None:
+    """The ``real.source`` that the finished real clips come from: what stage `ingest` was last run with."""
+    try:
+        return str(read_yaml(Path("dvc.lock"))["stages"]["ingest"]["params"]["params.yaml"]["real.source"])
+    except (AnyviewError, KeyError, TypeError):
+        return None
+
+
 def lines(found: dict[str, Any]) -> Iterator[str]:
     """``survey`` as text."""
     columns = (*SPLITS, UNUSED)
@@ -42,7 +52,7 @@ def lines(found: dict[str, Any]) -> Iterator[str]:
     }.items():
         yield f"{name:20}{sum(counts.values()):7}" + "".join(f"{counts[column]:12}" for column in columns)
     raw = ", ".join(f"{count} {origin}" for origin, count in found["raw"].items())
-    yield f"raw clips: {raw}; the real ones above are {found['source']} (real.source)"
+    yield f"raw clips: {raw}; the real ones above are {found['source']}"
     yield f"refused: {len(found['refused'])}"
     for row in found["refused"][:_SHOWN]:
         yield f"  {row['file']}: {row['reason']}"

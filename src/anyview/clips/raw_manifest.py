@@ -5,27 +5,36 @@ from pathlib import Path
 
 import pandas as pd
 
-from anyview.clips.manifests import RAW_COLUMNS, read_table
+from anyview.clips.manifests import RAW_COLUMNS
 from anyview.runtime.errors import AnyviewError
 
 
 def read_raw_manifest(path: Path) -> pd.DataFrame:
-    """The rows of ``path``, a CSV table of ``RAW_COLUMNS``.
+    """The rows of ``path``, a CSV table with at least ``RAW_COLUMNS``; spaces around a cell do not count.
 
-    Raises AnyviewError as ``read_table`` does, and for a row with more or fewer cells than the first line:
-    one comma too many would give every cell to its neighbour's column.
+    Raises AnyviewError naming the file when it is missing or no such table, and the line of a row with more
+    or fewer cells than the first: one comma too many would give every cell to its neighbour's column.
     """
-    table = read_table(path, RAW_COLUMNS)
-    names = 0
+    rows: list[list[str]] = []
     try:
-        with path.open(newline="", encoding="utf-8") as lines:
-            rows = csv.reader(lines)
-            for row in rows:
-                names = names or len(row)
-                if row and len(row) != names:
+        with path.open(newline="", encoding="utf-8-sig") as lines:
+            reader = csv.reader(lines)
+            for row in reader:
+                cells = [cell.strip() for cell in row]
+                if not any(cells):
+                    continue
+                rows.append(cells)
+                if len(cells) != len(rows[0]):
                     raise AnyviewError(
-                        f"{path}: line {rows.line_num} has {len(row)} cells, the first has {names}"
+                        f"{path}: line {reader.line_num} has {len(cells)} cells, the first has {len(rows[0])}"
                     )
-    except csv.Error as error:
+    except FileNotFoundError:
+        raise AnyviewError(f"{path}: no such file") from None
+    except (csv.Error, UnicodeError) as error:
         raise AnyviewError(f"{path}: not a CSV table: {error}") from None
-    return table
+    names = rows[0] if rows else []
+    missing = [column for column in RAW_COLUMNS if column not in names]
+    if missing or len(set(names)) < len(names):
+        found = f"no column {missing[0]}" if missing else "two columns of one name"
+        raise AnyviewError(f"{path}: {found}; its first line must be {','.join(RAW_COLUMNS)}")
+    return pd.DataFrame(rows[1:], columns=names, dtype=str)

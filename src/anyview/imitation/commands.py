@@ -33,9 +33,9 @@ def watch(
         raise AnyviewError(f"{output}: the output must end in {' or '.join(CODECS)}")
     if size % 2:
         raise AnyviewError(f"--size {size}: must be even")
-    if not (POLICIES / cell).is_dir():
-        there = ", ".join(sorted(folder.name for folder in POLICIES.glob("*/"))) or "none; run `dvc repro`"
-        raise AnyviewError(f"{cell}: no such method was evaluated; there are {there}")
+    there = sorted(folder.name for folder in POLICIES.glob("*/"))
+    if cell not in there:
+        raise AnyviewError(f"{cell}: no such method was evaluated; there are {', '.join(there) or 'none'}")
     policy = load_policy(POLICIES / cell, run)
     pusher = PusherBatch([policy.context], policy.control, size)
     observation = pusher.reset()[0]

@@ -54,7 +54,7 @@ def sweep(
         typer.Option(
             metavar="NAME",
             help="What to draw, named as in `anyview review`; repeat for more "
-            "[default: success and final distance of ours]",
+            "(by default success and final distance of ours)",
         ),
     ] = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="The picture, .svg or .png.")] = Path(
@@ -84,7 +84,11 @@ def sweep(
             }
             for trial in found.trials
         ]
-        print(json.dumps({"key": key, "left_out": found.left_out, "trials": trials}, indent=2))
+        print(
+            json.dumps(
+                {"key": key, "output": str(output), "left_out": found.left_out, "trials": trials}, indent=2
+            )
+        )
         return
     print("\n".join(table(found)))
     if found.left_out:

@@ -119,8 +119,8 @@ def _scale(study: Study) -> Iterator[tuple[str, str, str]]:
         stated = "{} train, {} validation and {} extreme".format(*thesis_counts)
         yield "Real clips" + (" (here: surrogate)" if study.surrogate else ""), stated, here
     if study.trainings:
-        sim = params.translation.cells["sim"]
-        if sim.method == "translator":
+        sim = params.translation.cells.get("sim")
+        if sim is not None and sim.method == "translator":
             yield "Network of the sim translator", "sim", sim.architecture
         yield "Frames in a batch", str(thesis.BATCH), str(params.translation.training.batch_size)
     lengths = {cell: int(training.curve["iteration"].max()) for cell, training in study.trainings.items()}

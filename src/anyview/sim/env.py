@@ -40,6 +40,7 @@ class PusherEnv(gym.Env):
         image_size: int = 64,
         render_mode: str | None = None,
     ):
+        _check_choices(kind, control)
         self.observation_space = _OBSERVATION_SPACE
         self.action_space = _ACTION_SPACE
         self.render_mode = render_mode
@@ -84,6 +85,7 @@ class PusherVectorEnv(VectorEnv):
     ):
         if contexts is not None and len(contexts) != num_envs:
             raise ValueError(f"{len(contexts)} contexts for {num_envs} environments")
+        _check_choices(kind, control)
         self.num_envs = num_envs
         self.single_observation_space, self.single_action_space = _OBSERVATION_SPACE, _ACTION_SPACE
         self.observation_space = batch_space(_OBSERVATION_SPACE, num_envs)
@@ -137,6 +139,15 @@ class PusherVectorEnv(VectorEnv):
 
 def _draw(rng: np.random.Generator, kind: Kind) -> Context:
     return sample_contexts(rng, 1, kind)[0][0]
+
+
+def _check_choices(kind: str, control: str) -> None:
+    for name, value, choices in (
+        ("kind", kind, ("diverse", "narrow")),
+        ("control", control, ("twist", "torque")),
+    ):
+        if value not in choices:
+            raise ValueError(f"{name} {value!r}: must be {' or '.join(choices)}")
 
 
 def _info(batch: PusherBatch, index: int) -> dict[str, Any]:

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 
 from anyview.clips.containers import Damaged, check_container
+from anyview.clips.ffmpeg import listening
 from anyview.clips.video import open_capture
 from anyview.runtime.errors import AnyviewError
 
@@ -28,10 +29,17 @@ def read_view(path: Path, size: int) -> np.ndarray:
     """A picture, or the first frame of a video, as uint8 RGB (size, size, 3)."""
     if not path.is_file():
         raise AnyviewError(f"{path}: no such file")
-    try:
-        picture = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_COLOR) if path.stat().st_size else None
-    except cv2.error:
-        raise AnyviewError(f"{path}: damaged, or a picture too large to open") from None
+    with listening() as messages:
+        try:
+            picture = (
+                cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_COLOR) if path.stat().st_size else None
+            )
+        except cv2.error:
+            raise AnyviewError(f"{path}: damaged, or a picture too large to open") from None
+        if damage := messages.damage():
+            raise AnyviewError(f"{path}: damaged: {damage}")
+    if picture is None and cv2.haveImageReader(str(path)):
+        raise AnyviewError(f"{path}: a picture that is damaged, or too large to open")
     return _read(path, size, 1)[0][0] if picture is None else _square(picture, size)
 
 
