@@ -62,6 +62,31 @@ def test_the_committed_params_are_sound():
         ("base.seed", -1, "base.seed: Input should be greater than or equal to 0, got -1"),
         ("base.sead", 1, "base.sead: unknown key"),
         (
+            "imitation.cells.ours.source",
+            "data/models/nosuch",
+            "imitation.cells.ours.source: for the reward translated",
+        ),
+        (
+            "imitation.cells.ours.source",
+            "data/models/tcn",
+            "imitation.cells.ours.source: for the reward translated",
+        ),
+        (
+            "imitation.cells.tcn.source",
+            "data/models/sim",
+            "imitation.cells.tcn.source: for the reward embedding it must be data/models/tcn, got 'data",
+        ),
+        (
+            "imitation.cells.gail.source",
+            "src/anyview/imitation/tpil.py",
+            "imitation.cells.gail.source: for the reward gail it must be src/anyview/imitation/gail.py, got",
+        ),
+        (
+            "split.real",
+            {"train": 0.9, "validation": 0.9},
+            "split.real: the fractions train and validation sum to more than 1",
+        ),
+        (
             "simulate.diverse.demos",
             "many",
             "simulate.diverse.demos: Input should be a valid integer, got 'many'",

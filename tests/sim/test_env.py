@@ -27,6 +27,13 @@ def test_importing_the_package_is_enough() -> None:
     assert "PusherEnv" in done.stdout
 
 
+@pytest.mark.parametrize(("name", "value"), [("control", "tourque"), ("kind", "wide")])
+def test_a_misspelt_choice_is_refused(name: str, value: str) -> None:
+    for make in (gym.make, gym.make_vec):
+        with pytest.raises(ValueError, match=f"{name} '{value}': must be "):
+            make(ENV_ID, **{name: value})
+
+
 def test_vector_environment_equals_single_ones_step_for_step() -> None:
     count = 3
     together = gym.make_vec(ENV_ID, num_envs=count, vectorization_mode="vector_entry_point")

@@ -129,6 +129,28 @@ def test_a_view_that_claims_a_giant_picture_is_refused(tmp_path):
         read_view(path, 48)
 
 
+@pytest.mark.parametrize("suffix", [".jpg", ".png"])
+def test_a_damaged_view_is_refused(tmp_path, suffix):
+    picture = np.random.default_rng(0).integers(0, 255, (120, 120, 3), np.uint8)
+    content = bytearray(cv2.imencode(suffix, picture)[1])
+    whole, path = bytes(content), tmp_path / f"view{suffix}"
+    content[len(content) // 2 : len(content) // 2 + 300] = bytes(300)
+    for damaged in (bytes(content), whole[: len(whole) // 2]):
+        path.write_bytes(damaged)
+        with pytest.raises(AnyviewError, match=r"view\.(jpg|png): .*damaged"):
+            read_view(path, 48)
+    path.write_bytes(whole)
+    assert read_view(path, 48).shape == (48, 48, 3)
+
+
+def test_a_cell_and_the_data_set_that_dvc_yaml_gives_it(study, root):
+    for stage in ("train", "translate"):
+        ended = run(root / f"stages/{stage}.py", "sim", "sim-narrow")
+        assert_refused(
+            ended, "translation.cells.sim.dataset is sim-diverse, but dvc.yaml makes the cell depend on"
+        )
+
+
 def test_wide_clips_are_cut_to_their_middle_and_a_clip_may_be_the_context(footage):
     for clip, context, output in (("clip.avi", "view.png", "a.avi"), ("wide.avi", "view.avi", "b.avi")):
         translate(Path(clip), Path(context), Path("mine"), Path(output))
