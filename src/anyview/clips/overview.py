@@ -6,7 +6,8 @@ from typing import Any
 
 import pandas as pd
 
-from anyview.clips.manifests import KINDS, RAW_COLUMNS, read_table
+from anyview.clips.manifests import KINDS, read_table
+from anyview.clips.raw_manifest import read_raw_manifest
 from anyview.clips.splits import SPLITS, read_split
 from anyview.config import read_yaml
 from anyview.runtime.errors import AnyviewError
@@ -26,7 +27,8 @@ def survey(source: str) -> dict[str, Any]:
 
     ``source`` is the origin that the finished real clips have, ``surrogate`` or ``recorded``.
     """
-    raw = {origin: len(_table(folder / "manifest.csv", RAW_COLUMNS)) for origin, folder in _RAW.items()}
+    manifests = {origin: folder / "manifest.csv" for origin, folder in _RAW.items()}
+    raw = {origin: len(read_raw_manifest(path)) if path.exists() else 0 for origin, path in manifests.items()}
     sets = {name: _by_split(name, folder) for name, folder in _SETS.items()}
     clips = _split_of(_table(_SETS["real"] / "manifest.csv", ["clip", "kind"]), "real")
     kinds = {kind: _count(clips["split"][clips["kind"] == kind]) for kind in KINDS}
@@ -60,8 +62,8 @@ def lines(found: dict[str, Any]) -> Iterator[str]:
         yield f"  and more: see {_SETS['real'] / 'refused.csv'}"
 
 
-def _table(path: Path, columns: list[str] | tuple[str, ...]) -> pd.DataFrame:
-    return read_table(path, columns) if path.exists() else pd.DataFrame(columns=list(columns))
+def _table(path: Path, columns: list[str]) -> pd.DataFrame:
+    return read_table(path, columns) if path.exists() else pd.DataFrame(columns=columns)
 
 
 def _by_split(name: str, folder: Path) -> dict[str, int]:

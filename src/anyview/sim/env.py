@@ -5,7 +5,7 @@ true state; imitation replaces it with what the camera sees. Episodes are trunca
 """
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, get_args
 
 import gymnasium as gym
 import numpy as np
@@ -143,7 +143,7 @@ def _draw(rng: np.random.Generator, kind: Kind) -> Context:
 
 def _check_choices(kind: str, control: str) -> None:
     for name, value, choices in (
-        ("kind", kind, ("diverse", "narrow")),
+        ("kind", kind, get_args(Kind)),
         ("control", control, ("twist", "torque")),
     ):
         if value not in choices:

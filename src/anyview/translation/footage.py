@@ -1,5 +1,6 @@
 """A user's own footage as input of a translator: the middle square, shrunk to the model's size."""
 
+from contextlib import suppress
 from pathlib import Path
 
 import cv2
@@ -29,17 +30,13 @@ def read_view(path: Path, size: int) -> np.ndarray:
     """A picture, or the first frame of a video, as uint8 RGB (size, size, 3)."""
     if not path.is_file():
         raise AnyviewError(f"{path}: no such file")
+    content, picture = np.fromfile(path, np.uint8), None
     with listening() as messages:
-        try:
-            picture = (
-                cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_COLOR) if path.stat().st_size else None
-            )
-        except cv2.error:
-            raise AnyviewError(f"{path}: damaged, or a picture too large to open") from None
-        if damage := messages.damage():
-            raise AnyviewError(f"{path}: damaged: {damage}")
-    if picture is None and cv2.haveImageReader(str(path)):
-        raise AnyviewError(f"{path}: a picture that is damaged, or too large to open")
+        with suppress(cv2.error):  # told below, like every picture that does not open
+            picture = cv2.imdecode(content, cv2.IMREAD_COLOR) if len(content) else None
+        damage = messages.damage()
+    if damage or (picture is None and cv2.haveImageReader(str(path))):
+        raise AnyviewError(f"{path}: damaged: {damage or 'not a whole picture, or one too large to open'}")
     return _read(path, size, 1)[0][0] if picture is None else _square(picture, size)
 
 
