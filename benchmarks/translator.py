@@ -98,7 +98,8 @@ class PlainLoop:
     def loss(self, iteration: int) -> Tensor:
         """L of the iteration's batch."""
         pairs = training_pairs(self._dataset, stream(self._recipe.seed, "translator/pairs", iteration), BATCH)
-        expert, context, target = (to_input(frames).contiguous() for frames in pairs.frames(self._dataset))
+        paired, context = (to_input(frames).contiguous() for frames in pairs.frames(self._dataset))
+        expert, target = paired.chunk(2)
         model, noise = self.model, self._noise
         z1 = model.encode_expert(expert, noise)
         z2, skips = model.encode_context(context, noise)
@@ -139,9 +140,9 @@ def operations(architecture: str, dataset: Dataset) -> tuple[int, int]:
     """Floating-point operations of the fast loop's network, forward and backward, for one batch."""
     model = ContextTranslator(architecture, dataset.image_size)
     pairs = training_pairs(dataset, stream(0, "count"), BATCH)
-    expert, context, target = (to_input(frames) for frames in pairs.frames(dataset))
+    paired, context = (to_input(frames) for frames in pairs.frames(dataset))
     with FlopCounterMode(display=False) as forward:
-        loss = batch_losses(model, torch.cat((expert, target)), context).total(ONE)
+        loss = batch_losses(model, paired, context).total(ONE)
     with FlopCounterMode(display=False) as backward:
         loss.backward()
     return forward.get_total_flops(), backward.get_total_flops()

@@ -54,7 +54,7 @@ def test_every_layer_has_the_shape_of_the_table(model):
         shares = model.decoder.shares(maps)
         assert z1.shape == z2.shape == z3.shape == (2, width)
         assert [tuple(m.shape[1:]) for m in maps] == [(out, side, side) for _, out, side in convolutions]
-        assert [tuple(s.shape[1:]) for s in shares] == [
+        assert [tuple(s.map.shape[1:]) for s in shares] == [
             (out, side, side) for _, out, side in fractional_maps(model)
         ]
         assert model.decode(z3, maps).shape == (2, 3, size, size)
@@ -90,21 +90,34 @@ def test_only_the_real_architecture_shares_its_encoders(model):
     assert same == model.shared == (model.architecture == "real")
 
 
+def decode_as_stated(model: ContextTranslator, z: torch.Tensor, maps: list[torch.Tensor]) -> torch.Tensor:
+    """The layers as the thesis states them: concatenate, convolve, LeakyReLU 0.2, linear frame."""
+    fractional = LAYERS[model.architecture][3]
+    hidden = F.leaky_relu(model.decoder.hidden(z), 0.2)
+    channels, side = maps[-1].shape[1:3]
+    x = hidden.view(len(z), side, side, channels).permute(0, 3, 1, 2)
+    for index, (layer, skip) in enumerate(zip(model.decoder.convolutions, maps[::-1], strict=True)):
+        stride = fractional[index][2] // x.shape[-1]
+        x = torch.cat((x, skip), dim=1)
+        x = F.conv_transpose2d(x, layer.weight, layer.bias, stride, padding=2, output_padding=stride - 1)
+        x = F.leaky_relu(x, 0.2) if index < 3 else x
+    return x
+
+
 def test_decoder_is_fractional_convolution_over_concatenated_skips(model):
-    """Against the layers as the thesis states them: concatenate, convolve, LeakyReLU 0.2, linear frame."""
-    size, _, _, fractional = LAYERS[model.architecture]
-    frames = torch.rand(3, 3, size, size)
+    """The same picture, and the same gradient of every weight, of the features and of the skips."""
+    frames = torch.rand(3, 3, model.image_size, model.image_size)
     with torch.no_grad():
         z2, maps = model.encode_context(frames)
-        hidden = F.leaky_relu(model.decoder.hidden(z2), 0.2)
-        channels, side = maps[-1].shape[1:3]
-        x = hidden.view(3, side, side, channels).permute(0, 3, 1, 2)
-        for index, (layer, skip) in enumerate(zip(model.decoder.convolutions, maps[::-1], strict=True)):
-            stride = fractional[index][2] // x.shape[-1]
-            x = torch.cat((x, skip), dim=1)
-            x = F.conv_transpose2d(x, layer.weight, layer.bias, stride, padding=2, output_padding=stride - 1)
-            x = F.leaky_relu(x, 0.2) if index < 3 else x
-        torch.testing.assert_close(model.decode(z2, maps), x, rtol=1e-4, atol=1e-5)
+    learned = [z2, *maps, *model.decoder.parameters()]
+    for tensor in learned:
+        tensor.requires_grad_()
+    ours, stated = model.decode(z2, maps), decode_as_stated(model, z2, maps)
+    torch.testing.assert_close(ours, stated, rtol=1e-4, atol=1e-5)
+    target = torch.rand_like(stated)
+    gradients = [torch.autograd.grad(((x - target) ** 2).sum(), learned) for x in (ours, stated)]
+    for found, expected in zip(*gradients, strict=True):
+        torch.testing.assert_close(found, expected, rtol=1e-4, atol=1e-4 * expected.abs().max().item())
 
 
 def test_one_context_serves_many_frames(model):

@@ -6,7 +6,7 @@ T(z1, z2) -> z3, and Dec(z3, skips of Enc2(o_0^j)) is the expert's frame as the 
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Literal, cast
+from typing import Any, Literal, NamedTuple, cast
 
 import numpy as np
 import torch
@@ -114,64 +114,97 @@ class Translation(nn.Module):
         return self.output(_drop(hidden, self._dropout, noise))
 
 
+class Share(NamedTuple):
+    """What a ``SkipConvolution`` computes once for everything that is decoded in the same K contexts."""
+
+    weight: Tensor
+    """The weights of the layer below."""
+    map: Tensor
+    """The part of Enc2's map, the bias with it, (K, channels, H, W)."""
+
+
 class SkipConvolution(nn.ConvTranspose2d):
     """Fractional convolution over the concatenation of the layer below and Enc2's map of equal size.
 
-    It is linear, so the two parts are convolved apart and added: the map's part is then computed once for
-    everything that is decoded in the same context.
+    It is linear, so the two parts are convolved apart and added.
     """
 
     def __init__(self, below: int, skip: int, channels: int, stride: int):
         super().__init__(below + skip, channels, _KERNEL, stride, _KERNEL // 2, output_padding=stride - 1)
-        self._below = below
+        self._parts = [below, skip]
 
-    def share(self, skip: Tensor) -> Tensor:
-        """The part of ``skip``, the bias with it."""
-        return self._convolve(skip, self.weight[self._below :], self.bias)
+    def share(self, skip: Tensor) -> Share:
+        """What ``forward`` needs besides the layer below, of Enc2's map ``skip`` (K, ...)."""
+        weight, skip_weight = self.weight.split(self._parts)
+        return Share(weight, self._convolve(skip, skip_weight, self.bias))
 
-    def forward(self, x: Tensor, share: Tensor) -> Tensor:  # type: ignore[override]
-        """The layer's output for ``x`` (N, ...) and the ``share`` (K, ...) of K contexts, row n modulo K."""
-        own = self._convolve(x, self.weight[: self._below], None)
-        if len(share) != len(own):
-            share = share.repeat(len(own) // len(share), 1, 1, 1)
-        return own.add_(share)
+    def forward(self, x: Tensor, share: Share) -> Tensor:  # type: ignore[override]
+        """The layer's output for ``x`` (N, ...) and the ``share`` of K contexts, row n modulo K."""
+        own = self._convolve(x, share.weight, None)
+        known = share.map
+        if len(known) != len(own):
+            known = known.repeat(len(own) // len(known), 1, 1, 1)
+        return own.add_(known)
 
     def _convolve(self, x: Tensor, weight: Tensor, bias: Tensor | None) -> Tensor:
-        stride = self.stride[0]
-        if stride == 2 and self.out_channels == _COLOURS:
-            return cast(Tensor, _DoublingToColours.apply(x, weight.to(x.dtype), bias))
-        return F.conv_transpose2d(x, weight, bias, stride, _KERNEL // 2, stride - 1)
+        return cast(Tensor, _FractionalConvolution.apply(x, weight.to(x.dtype), bias, self.stride[0]))
 
 
-class _DoublingToColours(torch.autograd.Function):
-    """The fractional convolution of stride 2 that ends in colours, x (N, K, H, W) -> (N, 3, 2H, 2W).
+class _FractionalConvolution(torch.autograd.Function):
+    """PyTorch's ``conv_transpose2d``, x (N, K, H, W) -> (N, C, sH, sW), where that is slow on a processor.
 
-    On a processor the ordinary one is slow where few channels come out. Its even and odd rows and columns are
-    four plain 3x3 convolutions of ``x``: done as one, forward takes less than half the time. Backward is the
-    ordinary one's.
+    Forward is where it ends in the few colours, backward where there is a bias.
     """
 
     @staticmethod
-    def forward(ctx: Any, x: Tensor, weight: Tensor, bias: Tensor | None) -> Tensor:
+    def forward(ctx: Any, x: Tensor, weight: Tensor, bias: Tensor | None, stride: int) -> Tensor:
         ctx.save_for_backward(x, weight)
-        ctx.bias = bias is not None
-        inputs, outputs = weight.shape[:2]
-        # Output 2y + a takes input y + d by the weight at k = a + 2 - 2d: of six places, counted from the
-        # last, the one at 2(d + 1) + 1 - a.
-        taps = F.pad(weight, (0, 1, 0, 1)).flip(2, 3).view(inputs, outputs, 3, 2, 3, 2).flip(3, 5)
-        kernel = taps.permute(1, 3, 5, 0, 2, 4).reshape(4 * outputs, inputs, 3, 3)
-        parts = F.conv2d(x, kernel, None if bias is None else bias.repeat_interleave(4), padding=1)
-        return F.pixel_shuffle(parts, 2)
+        ctx.stride = stride
+        if stride == 2 and weight.shape[1] == _COLOURS:
+            return _double_to_colours(x, weight, bias)
+        return F.conv_transpose2d(x, weight, bias, stride, _KERNEL // 2, stride - 1)
 
     @staticmethod
     def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor | None, ...]:
         x, weight = ctx.saved_tensors
-        half, one = [_KERNEL // 2] * 2, [1, 1]
-        wanted = [ctx.needs_input_grad[0], ctx.needs_input_grad[1], ctx.bias]
-        sizes = [weight.shape[1]] if ctx.bias else None
-        return torch.ops.aten.convolution_backward(
-            gradient, x, weight, sizes, [2, 2], half, one, True, one, 1, wanted
+        of_x, of_weight, of_bias, _ = ctx.needs_input_grad
+        stride, half, one = [ctx.stride] * 2, [_KERNEL // 2] * 2, [1, 1]
+        output_padding, wanted = [ctx.stride - 1] * 2, [of_x, of_weight, False]
+        x_gradient, weight_gradient, _ = torch.ops.aten.convolution_backward(
+            gradient, x, weight, None, stride, half, one, True, output_padding, 1, wanted
         )
+        return x_gradient, weight_gradient, _sum_over_places(gradient) if of_bias else None, None
+
+
+def _double_to_colours(x: Tensor, weight: Tensor, bias: Tensor | None) -> Tensor:
+    """The fractional convolution of stride 2 that ends in colours, x (N, K, H, W) -> (N, 3, 2H, 2W).
+
+    Its even and odd rows and columns are four plain 3x3 convolutions of ``x``: done as one, they take less
+    than half the time.
+    """
+    inputs, outputs = weight.shape[:2]
+    # Output 2y + a takes input y + d by the weight at k = a + 2 - 2d: of six places, counted from the
+    # last, the one at 2(d + 1) + 1 - a.
+    taps = F.pad(weight, (0, 1, 0, 1)).flip(2, 3).view(inputs, outputs, 3, 2, 3, 2).flip(3, 5)
+    kernel = taps.permute(3, 5, 1, 0, 2, 4).reshape(4 * outputs, inputs, 3, 3)
+    parts = F.conv2d(x, kernel, None if bias is None else bias.repeat(4), padding=1)
+    # Colours come last in memory, two columns' beside each other: only rows and columns change places.
+    places = parts.movedim(1, -1).unflatten(-1, (2, -1)).transpose(2, 3)
+    shape = len(x), outputs, 2 * x.shape[2], 2 * x.shape[3]
+    output = torch.empty(shape, dtype=x.dtype, device=x.device, memory_format=torch.channels_last)
+    output.movedim(1, -1).view_as(places).copy_(places)
+    return output
+
+
+def _sum_over_places(gradient: Tensor) -> Tensor:
+    """A bias's gradient (C,) of the ``gradient`` (N, C, H, W) of what it was added to."""
+    if gradient.device.type != "cpu":
+        return gradient.sum((0, 2, 3))
+    # Place after place of a picture, then picture after picture, in float32: PyTorch's own order, so the same
+    # bits. But a bag of embeddings does all channels at once, in a twentieth of the time.
+    places = gradient.movedim(1, -1).flatten(0, 2).float()
+    pictures = F.embedding_bag(torch.arange(len(places)).view(len(gradient), -1), places, mode="sum")
+    return F.embedding_bag(torch.arange(len(pictures))[None], pictures, mode="sum")[0].to(gradient.dtype)
 
 
 class Decoder(nn.Module):
@@ -189,12 +222,12 @@ class Decoder(nn.Module):
             for below, skip, (channels, stride) in zip(inputs, skips, architecture.decoder, strict=False)
         )
 
-    def shares(self, skips: list[Tensor]) -> list[Tensor]:
-        """What Enc2's maps add to each convolution, for ``forward``."""
+    def shares(self, skips: list[Tensor]) -> list[Share]:
+        """What each convolution needs of Enc2's maps, for ``forward``."""
         layers = cast(Iterable[SkipConvolution], self.convolutions)
         return [layer.share(skip) for layer, skip in zip(layers, reversed(skips), strict=True)]
 
-    def forward(self, z: Tensor, shares: list[Tensor], noise: Generator | None = None) -> Tensor:
+    def forward(self, z: Tensor, shares: list[Share], noise: Generator | None = None) -> Tensor:
         hidden = _drop(_activate(self.hidden(z)), self._dropout, noise)
         x = hidden.unflatten(1, (self._side, self._side, -1)).movedim(-1, 1)
         *layers, last = zip(self.convolutions, shares, strict=True)

@@ -1,6 +1,7 @@
 """Time-paired frames of two clips, to learn from, and the fixed pairs of clips that judge a translator."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 
@@ -39,7 +40,12 @@ class Dataset:
 
     def split(self, name: str) -> np.ndarray:
         """Indices of the clips of a split, in the order of the manifest."""
-        return np.flatnonzero((self.clips["split"] == name).to_numpy())
+        return self._splits.get(name, np.empty(0, int))
+
+    @cached_property  # training asks at every iteration
+    def _splits(self) -> dict[str, np.ndarray]:
+        names = self.clips["split"].to_numpy()
+        return {name: np.flatnonzero(names == name) for name in np.unique(names)}
 
 
 @dataclass(frozen=True)
@@ -60,10 +66,10 @@ class FramePairs:
             FramePairs(self.sources[a:b], self.targets[a:b], self.times[a:b]) for a, b in pairwise(bounds)
         ]
 
-    def frames(self, dataset: Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """o_t^i, o_0^j and o_t^j, each uint8 (N, H, W, 3)."""
-        frames = dataset.frames
-        return frames[self.sources, self.times], frames[self.targets, 0], frames[self.targets, self.times]
+    def frames(self, dataset: Dataset) -> tuple[np.ndarray, np.ndarray]:
+        """o_t^i and after them o_t^j, uint8 (2N, H, W, 3), and o_0^j, (N, H, W, 3)."""
+        clips, times = np.concatenate((self.sources, self.targets)), np.tile(self.times, 2)
+        return dataset.frames[clips, times], dataset.frames[self.targets, 0]
 
 
 def check_dataset(cell: str, dataset: str, declared: list[str]) -> None:

@@ -1,7 +1,6 @@
 """One translator in training: its update step, its validation, and its state for a checkpoint."""
 
 import math
-from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -15,12 +14,18 @@ from anyview.runtime.seeds import stream, torch_seed
 from anyview.translation.augmentation import Augmentation
 from anyview.translation.losses import Losses, batch_losses
 from anyview.translation.network import ContextTranslator, to_input
+from anyview.translation.optimization import MakeOptimizer, SharedOptimizer, learning_rate
 from anyview.translation.sampling import Dataset, FramePairs, training_pairs, validation_pairs
 from anyview.translation.weights import restore_state, stored_state
 
 # A batch is worked off in a fixed number of parts side by side, one thread each: the bytes do not depend on
 # the number of cores, and the threads wait for each other once an iteration, not once an operation.
 _PARTS = 2
+
+_OPTIMIZERS: dict[str, MakeOptimizer] = {
+    "adam": lambda parameters: torch.optim.Adam(parameters, fused=True),
+    "adadelta": lambda parameters: torch.optim.Adadelta(parameters, foreach=True),
+}
 
 
 @dataclass(frozen=True)
@@ -47,7 +52,8 @@ class Trainer:
             self.model = ContextTranslator(recipe.cell.architecture, dataset.image_size)
         self.model.to(self._device).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
         self._parameters = list(self.model.parameters())
-        self._optimizer = _optimizer(recipe, self._parameters)
+        make = _OPTIMIZERS[recipe.cell.optimizer]
+        self._optimizer = SharedOptimizer(self._parameters, make, self._parts)
         self._augmentation = Augmentation(dataset) if recipe.cell.augment else None
         rng = stream(recipe.seed, "translator/validation")
         self._validation = validation_pairs(dataset, rng, recipe.training.validation_pairs)
@@ -64,11 +70,7 @@ class Trainer:
         work = [(part, len(part) / len(pairs), iteration, index) for index, part in enumerate(parts)]
         found = list(self._pool.map(lambda unit: self._gradients(*unit), work))
         rate = learning_rate(training, iteration, self._recipe.cell.iterations)
-        for group in self._optimizer.param_groups:
-            group["lr"] = rate
-        for parameter, *gradients in zip(self._parameters, *(each for _, each in found), strict=True):
-            parameter.grad = _sum(parameter, gradients)
-        self._optimizer.step()
+        self._optimizer.step(rate, [gradients for _, gradients in found], self._pool)
         return torch.stack([losses for losses, _ in found]).sum(0)
 
     def _gradients(
@@ -121,67 +123,29 @@ class Trainer:
         """Model, optimiser and best weights, for a checkpoint."""
         arrays = {f"model/{name}": value.numpy() for name, value in stored_state(self.model).items()}
         arrays |= {f"best/{name}": value.numpy() for name, value in self.best.items()}
-        for index, state in self._optimizer.state_dict()["state"].items():
-            arrays |= {f"optimizer/{index}/{key}": value.cpu().numpy() for key, value in state.items()}
-        return arrays
+        return arrays | {f"optimizer/{name}": value for name, value in self._optimizer.arrays().items()}
 
     def restore(self, arrays: dict[str, np.ndarray], best_iteration: int, best_loss: float) -> None:
         """Continue from ``arrays()`` bit for bit."""
-        groups: dict[str, dict[str, Tensor]] = {"model": {}, "best": {}, "optimizer": {}}
+        groups: dict[str, dict[str, np.ndarray]] = {"model": {}, "best": {}, "optimizer": {}}
         for name, array in arrays.items():
             kind, rest = name.split("/", 1)
-            groups[kind][rest] = torch.from_numpy(array)
-        restore_state(self.model, groups["model"])
-        self.best, self.best_iteration, self.best_loss = groups["best"], best_iteration, best_loss
-        state: dict[int, dict[str, Tensor]] = {}
-        for name, value in groups["optimizer"].items():
-            index, key = name.split("/")
-            parameter = self._parameters[int(index)]
-            moment = value.shape == parameter.shape
-            state.setdefault(int(index), {})[key] = _laid_out_as(parameter if moment else value, value)
-        self._optimizer.load_state_dict(self._optimizer.state_dict() | {"state": state})
+            groups[kind][rest] = array
+        model, best = (
+            {k: torch.from_numpy(a) for k, a in groups[kind].items()} for kind in ("model", "best")
+        )
+        restore_state(self.model, model)
+        self.best, self.best_iteration, self.best_loss = best, best_iteration, best_loss
+        self._optimizer.restore(groups["optimizer"])
 
     def _frames(self, pairs: FramePairs) -> tuple[Tensor, Tensor]:
         """o_t^i and after them o_t^j (2N, 3, H, W), and o_0^j (N, 3, H, W): what ``batch_losses`` takes."""
-        frames, targets = self._dataset.frames, pairs.targets
-        paired = frames[np.concatenate((pairs.sources, targets)), np.tile(pairs.times, 2)]
-        first = frames[targets, np.zeros_like(targets)]
-        paired, context = (to_input(torch.from_numpy(f).to(self._device)) for f in (paired, first))
+        paired, context = (
+            to_input(torch.from_numpy(frames).to(self._device)) for frames in pairs.frames(self._dataset)
+        )
         return paired, context
 
     def _autocast(self) -> torch.autocast:
         reduced = self._recipe.training.precision == "bfloat16"
         # All threads share the cache of converted weights: what a part found there would be up to chance.
         return torch.autocast(self._device.type, torch.bfloat16, enabled=reduced, cache_enabled=False)
-
-
-def learning_rate(training: Training, iteration: int, iterations: int) -> float:
-    """The rate of an iteration: constant, or half a cosine from ``learning_rate`` down to 0."""
-    if training.schedule == "constant":
-        return training.learning_rate
-    return training.learning_rate * (1 + math.cos(math.pi * iteration / iterations)) / 2
-
-
-def _optimizer(recipe: Recipe, parameters: list[torch.nn.Parameter]) -> torch.optim.Optimizer:
-    rate = recipe.training.learning_rate
-    if recipe.cell.optimizer == "adam":
-        return torch.optim.Adam(parameters, lr=rate, fused=True)
-    return torch.optim.Adadelta(parameters, lr=rate, foreach=True)
-
-
-def _laid_out_as(like: Tensor, value: Tensor) -> Tensor:
-    """A copy with the strides of ``like``, a parameter: the fused optimiser takes them for granted."""
-    return torch.empty_like(like).copy_(value)
-
-
-def _sum(parameter: Tensor, gradients: Sequence[Tensor | None]) -> Tensor | None:
-    """The gradient of a batch from those of its parts; None where the loss does not reach the parameter."""
-    reached = [gradient for gradient in gradients if gradient is not None]
-    if not reached:
-        return None
-    total = reached[0]
-    if total.stride() != parameter.stride():
-        total = _laid_out_as(parameter, total)
-    for part in reached[1:]:
-        total.add_(part)
-    return total

@@ -15,7 +15,7 @@ from anyview.runtime.errors import AnyviewError
 from anyview.runtime.outputs import whole_folder, write_atomically
 from anyview.runtime.progress import track
 from anyview.runtime.scratch import content_key, scratch_folder
-from anyview.translation import augmentation, losses, network, sampling, trainer, weights
+from anyview.translation import augmentation, losses, network, optimization, sampling, trainer, weights
 from anyview.translation.sampling import DATASETS, open_dataset
 from anyview.translation.trainer import Recipe, Trainer
 from anyview.translation.weights import save_translator
@@ -113,7 +113,7 @@ def _meta(recipe: Recipe, run: Trainer) -> dict[str, Any]:
 
 def _key(recipe: Recipe) -> str:
     folder, split = DATASETS[recipe.cell.dataset]
-    code: list[ModuleType] = [augmentation, losses, network, sampling, trainer, weights]
+    code: list[ModuleType] = [augmentation, losses, network, optimization, sampling, trainer, weights]
     files = [Path(__file__), *(Path(str(module.__file__)) for module in code)]
     values = [recipe.name, recipe.cell.model_dump(), recipe.training.model_dump(), recipe.seed]
     return content_key(values, [*files, folder / "manifest.csv", folder / "files.csv", split])
