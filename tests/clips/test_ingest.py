@@ -307,6 +307,8 @@ def test_a_folder_without_a_manifest_gets_one_proposed(tmp_path):
         "day1/push-right.mp4",
         "extreme distractor/x_a.avi",
         "solo.mov",
+        "run-2.wmv",
+        "run-3-cam2.m2ts",
         "notes.txt",
     ]
     for name in names:
@@ -321,6 +323,8 @@ def test_a_folder_without_a_manifest_gets_one_proposed(tmp_path):
         "day1/push-right.mp4": ("day1/push", "right", "standard"),
         "extreme distractor/x_a.avi": ("extreme distractor/x", "a", "extreme_distractor"),
         "solo.mov": ("solo", "", "standard"),
+        "run-2.wmv": ("run-2", "", "standard"),
+        "run-3-cam2.m2ts": ("run-3", "2", "standard"),
     }
     assert propose_manifest(tmp_path / "day1")["file"].tolist() == ["push-left.mp4", "push-right.mp4"]
 

@@ -22,6 +22,9 @@ VIDEO_SUFFIXES = frozenset(
         ".mpeg",
         ".ts",
         ".mts",
+        ".m2ts",
+        ".vob",
+        ".wmv",
         ".flv",
         ".asf",
         ".ogv",
@@ -30,7 +33,9 @@ VIDEO_SUFFIXES = frozenset(
 )
 
 _TEXT = ("clip", "file", "pair", "camera", "kind", "split", "sha256", "reason")
-_CAMERA_WORD = re.compile(r"[-_ .](?:cam(?:era)?[-_ ]?)?(left|right|front|side|top|[a-d]|[1-4])$", re.I)
+_CAMERA = "left|right|front|side|top|[a-d]"
+# A number alone counts demonstrations: a camera's has the word before it.
+_CAMERA_WORD = re.compile(rf"[-_ .](?:cam(?:era)?[-_ ]?({_CAMERA}|[0-9]+)|({_CAMERA}))$", re.I)
 
 
 def read_table(path: Path, columns: Sequence[str], unique: str | None = None) -> pd.DataFrame:
@@ -76,7 +81,7 @@ def propose_manifest(folder: Path) -> pd.DataFrame:
             {
                 "file": file,
                 "pair": stem[: camera.start()] if camera else stem,
-                "camera": camera.group(1).lower() if camera else "",
+                "camera": camera[camera.lastindex or 0].lower() if camera else "",
                 "kind": kind,
             }
         )
