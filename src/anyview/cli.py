@@ -157,7 +157,7 @@ def profile(
 
 @app.command()
 def clean(as_json: Annotated[bool, typer.Option("--json", help="Print JSON for a script.")] = False) -> None:
-    """Empty the scratch folder: checkpoints and decoded frames, which stages make again."""
+    """Empty the scratch folder: checkpoints and decoded frames that no stage at work needs."""
     from anyview.runtime.scratch import clear_scratch, scratch_root
 
     folder, freed = scratch_root(), clear_scratch()

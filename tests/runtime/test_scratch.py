@@ -1,3 +1,5 @@
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -55,3 +57,49 @@ def test_checkpoints_are_keyed_by_the_code_too(scratch):
     first = scratch_folder("checkpoints", "abc")
     assert first.name.startswith("abc-")
     assert scratch_folder("checkpoints", "abc") == first
+
+
+def at_work(key: str) -> tuple[subprocess.Popen, Path]:
+    """Another process that has checkpoints in the folder it names, until its input ends."""
+    program = (
+        "import sys; from anyview.runtime.scratch import scratch_folder; "
+        f"folder = scratch_folder('checkpoints', '{key}'); (folder / 'half').write_text('half'); "
+        "print(folder, flush=True); sys.stdin.read()"
+    )
+    command = [sys.executable, "-c", program]
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    return process, Path(process.stdout.readline().strip())
+
+
+def test_two_processes_at_the_same_work_keep_apart(scratch):
+    """And after a kill the folder is there for the next one, with what was half done."""
+    first, folder = at_work("abc")
+    second, other = at_work("abc")
+    assert other.parent == folder.parent
+    assert other != folder
+    for process in (first, second):
+        process.kill()
+        process.communicate()
+    third, again = at_work("abc")
+    assert again == folder
+    assert (again / "half").read_text() == "half"
+    third.communicate()
+
+
+def test_clear_leaves_the_checkpoints_of_a_process_at_work(scratch):
+    process, folder = at_work("abc")
+    (scratch_folder("checkpoints", "def") / "checkpoint-a").touch()
+    clear_scratch()
+    assert (folder / "half").exists()
+    assert list(folder.parent.iterdir()) == [folder]
+    process.communicate()
+    clear_scratch()
+    assert not folder.exists()
+
+
+def test_a_folder_that_was_removed_is_made_again(scratch):
+    first = scratch_folder("checkpoints", "abc")
+    first.rmdir()
+    assert scratch_folder("checkpoints", "abc") == first
+    assert first.is_dir()

@@ -4,17 +4,23 @@
 made from (params, code, data), so that a change in any of these starts afresh and nothing stale is read.
 """
 
+import fcntl
 import hashlib
 import json
 import os
 import shutil
 import sys
 from collections.abc import Iterable
+from contextlib import suppress
 from functools import cache
+from itertools import count
 from pathlib import Path
 from typing import Any
 
 KINDS = ("checkpoints", "frames")
+
+# Folders of checkpoints that this process works in, each open and so locked until the process ends.
+_claimed: dict[Path, int] = {}
 
 
 def scratch_root() -> Path:
@@ -35,13 +41,47 @@ def content_key(values: Any, files: Iterable[Path] = ()) -> str:
 def scratch_folder(kind: str, key: str) -> Path:
     """Folder ``<scratch>/<kind>/<key>``, created. ``kind`` is one of ``KINDS``.
 
-    The key of checkpoints is extended by one of our code, so that an edit of any module starts afresh.
+    The key of checkpoints is extended by one of our code, so that an edit of any module starts afresh, and by
+    a number where another process is at the same work, in another clone for example.
     """
     if kind not in KINDS:
         raise ValueError(f"{kind}: scratch kinds are {', '.join(KINDS)}")
-    folder = scratch_root() / kind / (f"{key}-{_code_key()}" if kind == "checkpoints" else key)
+    if kind == "checkpoints":
+        name = f"{key}-{_code_key()}"
+        names = (name if number == 1 else f"{name}-{number}" for number in count(1))
+        return next(folder for each in names if _claim(folder := scratch_root() / kind / each))
+    folder = scratch_root() / kind / key
     folder.mkdir(parents=True, exist_ok=True)
     return folder
+
+
+def _claim(folder: Path) -> bool:
+    """Make ``folder`` and keep it for this process; False where another process has it."""
+    while not _is_claimed(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        try:
+            descriptor = os.open(folder, os.O_RDONLY)
+        except FileNotFoundError:  # the one before us has just finished and removed it
+            continue
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(descriptor)
+            return False
+        except OSError:  # a file system without locks: the work is ours alone, as a rule
+            pass
+        _claimed[folder] = descriptor
+    return True
+
+
+def _is_claimed(folder: Path) -> bool:
+    """Whether this process has ``folder``; lets go of it where it was removed since."""
+    if folder not in _claimed:
+        return False
+    if folder.exists() and os.path.samestat(os.stat(folder), os.fstat(_claimed[folder])):
+        return True
+    os.close(_claimed.pop(folder))
+    return False
 
 
 @cache
@@ -68,8 +108,15 @@ def scratch_size() -> int:
 
 
 def clear_scratch() -> int:
-    """Empty the scratch folder; returns the bytes freed. Nothing but what we put there is touched."""
+    """Empty the scratch folder but for checkpoints of stages at work; returns the bytes freed.
+
+    Nothing but what we put there is touched.
+    """
     before = scratch_size()
     for kind in KINDS:
-        shutil.rmtree(scratch_root() / kind, ignore_errors=True)
+        for entry in (scratch_root() / kind).glob("*"):
+            if kind != "checkpoints" or not entry.is_dir() or _claim(entry):
+                shutil.rmtree(entry, ignore_errors=True)
+        with suppress(OSError):  # not empty, or not there
+            (scratch_root() / kind).rmdir()
     return before - scratch_size()
