@@ -1,4 +1,4 @@
-"""Raw clips as other programs leave them, and ways to damage them."""
+"""Raw clips as other programs leave them, ways to damage them, and what ingest says of one."""
 
 from collections.abc import Iterator
 from functools import cache
@@ -7,6 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from anyview.clips.ingest import Candidate, ingest_clip
 from anyview.config import Ingest
 from anyview.runtime.seeds import stream
 
@@ -86,3 +87,12 @@ def damaged(content: bytes, count: int, seed: int) -> Iterator[tuple[str, bytes]
                     bytes(length) if way == "hole" else content[other : other + length]
                 )
             yield way, bytes(altered)
+
+
+def candidate(file: str, pair: str = "", kind: str = "standard") -> Candidate:
+    return Candidate(Path(file).stem, file, pair or Path(file).stem, "", kind)
+
+
+def judge(source: Path, file: str, folder: Path, limits=LIMITS) -> str:
+    folder.mkdir(exist_ok=True)
+    return ingest_clip(source, folder, candidate(file), limits).reason
