@@ -13,18 +13,18 @@ import sys
 import numpy as np
 import torch
 
+from anyview.adversarial.discriminators import ClipSet, LearnedReward
+from anyview.adversarial.gail import gail_reward
+from anyview.adversarial.tpil import random_motion, tpil_reward
+from anyview.analysis.statistics import bootstrap_interval
 from anyview.config import Params, load_params
-from anyview.imitation.discriminators import ClipSet, LearnedReward
-from anyview.imitation.evaluation import explore
-from anyview.imitation.gail import gail_reward
-from anyview.imitation.statistics import bootstrap_interval
-from anyview.imitation.tpil import random_motion, tpil_reward
-from anyview.imitation.trpo import TRPO
-from anyview.runtime.seeds import stream
-from anyview.sim.batch import ACTION_SIZE, ACTIONS, OBSERVATION_SIZE, PusherBatch
-from anyview.sim.contexts import Context, sample_contexts
-from anyview.sim.expert import roll_out
-from anyview.sim.render import renderer
+from anyview.evaluation.runs import explore
+from anyview.learners.trpo import TRPO
+from anyview.pusher.batch import ACTION_SIZE, ACTIONS, OBSERVATION_SIZE, PusherBatch
+from anyview.pusher.contexts import Context, sample_contexts
+from anyview.pusher.expert import roll_out
+from anyview.pusher.render import renderer
+from anyview.seeds import stream
 
 RUNS, BYSTANDERS, POINTS = 8, 10, 10
 

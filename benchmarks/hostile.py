@@ -33,7 +33,7 @@ from string import ascii_lowercase
 import numpy as np
 
 from anyview.runtime.errors import AnyviewError
-from anyview.runtime.seeds import stream
+from anyview.seeds import stream
 
 SECONDS, MEGABYTES = 10.0, 300
 STARTERS = ("os.system", "os.exec", "os.posix_spawn", "os.fork", "subprocess.Popen", "pickle.find_class")
@@ -114,8 +114,8 @@ def raw_clip(name: str, codec: str, sides: bytes, claimed: bytes) -> Callable[[P
     def make(box: Path) -> Target:
         import cv2
 
-        from anyview.clips.ingest import Candidate, ingest_clip
         from anyview.config import Ingest
+        from anyview.ingest.clips import Candidate, ingest_clip
 
         limits = Ingest(size=48, frames=80, rate=10.0, max_megabytes=50.0)
         writer = cv2.VideoWriter(
@@ -143,8 +143,8 @@ def table(name: str) -> Callable[[Path], Target]:
     """The manifest of raw clips, or a table of splits."""
 
     def make(box: Path) -> Target:
-        from anyview.clips.ingest import read_candidates
-        from anyview.clips.splits import read_split
+        from anyview.ingest.clips import read_candidates
+        from anyview.video.splits import read_split
 
         if name == "manifest.csv":
             rows = "".join(f"clip-{i}.avi,pair-{i // 2},left,standard\n" for i in range(20))
@@ -172,7 +172,7 @@ def stored_set(name: str) -> Callable[[Path], Target]:
     def make(box: Path) -> Target:
         import pandas as pd
 
-        from anyview.clips.store import open_frames, write_set, write_shard
+        from anyview.video.sets import open_frames, write_set, write_shard
 
         clips = np.stack([pictures()[shift : shift + 6, :32, :48] for shift in range(4)])
         files = [write_shard(box, index, clips[2 * index : 2 * index + 2]) for index in range(2)]
@@ -214,11 +214,11 @@ def model(name: str, folder: str) -> Callable[[Path], Target]:
     def make(box: Path) -> Target:
         import torch
 
-        from anyview.imitation.policies import load_policy, save_policies
-        from anyview.sim.contexts import sample_contexts
-        from anyview.translation.embedding import Embedding, load_embedding, save_embedding
-        from anyview.translation.network import ContextTranslator
-        from anyview.translation.weights import load_translator, save_translator
+        from anyview.embedding.embedding import Embedding, load_embedding, save_embedding
+        from anyview.learners.common.policies import load_policy, save_policies
+        from anyview.pusher.contexts import sample_contexts
+        from anyview.translator.network import ContextTranslator
+        from anyview.translator.weights import load_translator, save_translator
 
         torch.set_num_threads(1)
         if folder == "translator":

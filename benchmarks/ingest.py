@@ -15,10 +15,10 @@ from pathlib import Path
 
 import cv2
 
-from anyview.clips.ingest import Candidate, ingest_clip
-from anyview.clips.surrogate.film import film, plan
 from anyview.config import load_params
+from anyview.ingest.clips import Candidate, ingest_clip
 from anyview.runtime.workers import run_units
+from anyview.surrogate.film import film, plan
 
 DEMONSTRATIONS = 4  # filmed once; their clips are listed again until there are enough
 

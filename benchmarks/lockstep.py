@@ -23,20 +23,20 @@ import numpy as np
 import torch
 
 from anyview.config import Params, load_params
-from anyview.imitation.evaluation import groups_of
-from anyview.imitation.gym_env import TranslatedReward
-from anyview.imitation.methods import Group, make_learner
-from anyview.imitation.rewards import DemonstrationReward, translate_demonstrations
+from anyview.environments.pusher import PusherEnv
+from anyview.environments.translated import TranslatedReward
+from anyview.evaluation.methods import Group, make_learner
+from anyview.evaluation.runs import groups_of
+from anyview.pusher.batch import ACTION_SIZE, ACTIONS, OBSERVATION_SIZE, PusherBatch
+from anyview.pusher.contexts import Context, sample_contexts
+from anyview.pusher.expert import roll_out
+from anyview.pusher.render import renderer
+from anyview.pusher.scene import SUBSTEPS, model
+from anyview.rewards.demonstration import DemonstrationReward, translate_demonstrations
 from anyview.runtime.workers import run_units
-from anyview.sim.batch import ACTION_SIZE, ACTIONS, OBSERVATION_SIZE, PusherBatch
-from anyview.sim.contexts import Context, sample_contexts
-from anyview.sim.env import PusherEnv
-from anyview.sim.expert import roll_out
-from anyview.sim.render import renderer
-from anyview.sim.scene import SUBSTEPS, model
-from anyview.translation.network import ContextTranslator
+from anyview.translator.network import ContextTranslator
 
-import mujoco.batch  # isort: skip  (after anyview.sim, which chooses the OpenGL backend)
+import mujoco.batch  # isort: skip  (after anyview.pusher, which chooses the OpenGL backend)
 
 RUNS, EPISODES, ROUNDS = 15, 4, 3
 

@@ -15,14 +15,14 @@ import numpy as np
 import torch
 
 from anyview.config import load_params
-from anyview.imitation.demonstrations import imitated_demonstrations
-from anyview.imitation.rewards import translate_demonstrations
-from anyview.runtime.seeds import stream
-from anyview.sim.contexts import sample_contexts
-from anyview.sim.expert import roll_out
-from anyview.sim.render import renderer
-from anyview.translation.network import to_input
-from anyview.translation.weights import load_translator
+from anyview.evaluation.demonstrations import imitated_demonstrations
+from anyview.pusher.contexts import sample_contexts
+from anyview.pusher.expert import roll_out
+from anyview.pusher.render import renderer
+from anyview.rewards.demonstration import translate_demonstrations
+from anyview.seeds import stream
+from anyview.translator.network import to_input
+from anyview.translator.weights import load_translator
 
 REACH = 6  # centimetres each way
 

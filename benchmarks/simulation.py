@@ -1,7 +1,7 @@
 """Rendering and physics, each against the plain way on the same scene, side by side in one run.
 
-- frames per second of ``anyview.sim.render`` against ``mujoco.Renderer`` at its default quality, shadows and
-  multisampling off in both; ours renders at twice the size and averages, the plain one does not;
+- frames per second of ``anyview.pusher.render`` against ``mujoco.Renderer`` at its default quality, shadows
+  and multisampling off in both; ours renders at twice the size and averages, the plain one does not;
 - control steps per second of 15 pushers on ``mujoco.batch`` against a loop of ``mujoco.mj_step``.
 
 Usage: python benchmarks/simulation.py
@@ -13,12 +13,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from anyview.sim.batch import PusherBatch
-from anyview.sim.contexts import sample_contexts
-from anyview.sim.render import renderer
-from anyview.sim.scene import ARENA_CENTRE, CAMERA_DISTANCE, CAMERA_ELEVATION, SUBSTEPS, model
+from anyview.pusher.batch import PusherBatch
+from anyview.pusher.contexts import sample_contexts
+from anyview.pusher.render import renderer
+from anyview.pusher.scene import ARENA_CENTRE, CAMERA_DISTANCE, CAMERA_ELEVATION, SUBSTEPS, model
 
-import mujoco  # isort: skip  (after anyview.sim, which chooses the OpenGL backend)
+import mujoco  # isort: skip  (after anyview.pusher, which chooses the OpenGL backend)
 
 ROUNDS, RUNS, STEPS = 7, 15, 40
 

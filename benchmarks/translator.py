@@ -26,14 +26,14 @@ from torch import Tensor
 from torch.nn import functional as F
 from torch.utils.flop_counter import FlopCounterMode
 
-from anyview.clips.store import open_frames
 from anyview.config import LossWeights, Training, TranslatorCell
 from anyview.runtime.device import worker_count
-from anyview.runtime.seeds import stream, torch_seed
-from anyview.translation.losses import batch_losses
-from anyview.translation.network import ARCHITECTURES, ContextTranslator, to_input
-from anyview.translation.sampling import Dataset, training_pairs
-from anyview.translation.trainer import Recipe, Trainer
+from anyview.seeds import stream, torch_seed
+from anyview.training.sampling import Dataset, training_pairs
+from anyview.training.trainer import Recipe, Trainer
+from anyview.translator.losses import batch_losses
+from anyview.translator.network import ARCHITECTURES, ContextTranslator, to_input
+from anyview.video.sets import open_frames
 
 BATCH, CLIPS, LENGTH = 100, 120, 20
 ONE = LossWeights(translation=1.0, reconstruction=1.0, alignment=1.0)

@@ -18,8 +18,8 @@ import sb3_contrib
 import torch
 
 from anyview import config
-from anyview.imitation.trpo import TRPO
-from anyview.runtime.seeds import stream
+from anyview.learners.trpo import TRPO
+from anyview.seeds import stream
 
 TASK, HORIZON, TORQUE = "Pendulum-v1", 200, 2.0
 RUNS, COMPARED, STARTS, BATCH = 15, 5, 20, 10

@@ -16,12 +16,12 @@ from pathlib import Path
 import joblib
 import numpy as np
 
-from anyview.clips.store import write_shard
-from anyview.runtime.seeds import stream
+from anyview.pusher.contexts import sample_contexts
+from anyview.pusher.expert import roll_out
+from anyview.pusher.render import renderer
 from anyview.runtime.workers import run_units
-from anyview.sim.contexts import sample_contexts
-from anyview.sim.expert import roll_out
-from anyview.sim.render import renderer
+from anyview.seeds import stream
+from anyview.video.sets import write_shard
 
 SIZE = 64
 

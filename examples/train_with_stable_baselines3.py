@@ -12,13 +12,13 @@ from pathlib import Path
 from stable_baselines3 import SAC
 
 from anyview.config import load_params
-from anyview.imitation.demonstrations import imitated_demonstrations
-from anyview.imitation.gym_env import TranslatedReward
+from anyview.environments.pusher import PusherEnv
+from anyview.environments.translated import TranslatedReward
+from anyview.evaluation.demonstrations import imitated_demonstrations
+from anyview.pusher.contexts import sample_contexts
 from anyview.runtime.errors import exit_code
-from anyview.runtime.seeds import stream
-from anyview.sim.contexts import sample_contexts
-from anyview.sim.env import PusherEnv
-from anyview.translation.weights import load_translator
+from anyview.seeds import stream
+from anyview.translator.weights import load_translator
 
 
 def main(steps: int) -> None:

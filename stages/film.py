@@ -5,15 +5,14 @@ from pathlib import Path
 
 import pandas as pd
 
-from anyview import clips
-from anyview.clips.manifests import times_file
-from anyview.clips.surrogate.film import film, plan
 from anyview.config import load_params
 from anyview.runtime.errors import AnyviewError, run_stage
 from anyview.runtime.outputs import whole_folder, write_atomically
 from anyview.runtime.progress import track
 from anyview.runtime.scratch import content_key, scratch_folder
 from anyview.runtime.workers import run_units
+from anyview.surrogate.film import film, plan
+from anyview.video.manifests import times_file
 
 OUTPUT = Path("data/real/surrogate")
 
@@ -24,8 +23,7 @@ def main(arguments: list[str]) -> None:
         raise AnyviewError("usage: python stages/film.py")
     params = load_params()
     wanted = params.real.film
-    code = [Path(__file__), *Path(clips.__file__).parent.rglob("*.py")]
-    scratch = scratch_folder("checkpoints", content_key([params.base.seed, wanted.width], code))
+    scratch = scratch_folder("checkpoints", content_key(["film", params.base.seed, wanted.width]))
     demonstrations = plan(wanted.pairs, wanted.singles, wanted.extreme_pairs)
     units = [(scratch, demonstration, wanted.width, params.base.seed) for demonstration in demonstrations]
     rows: list[dict[str, str]] = []

@@ -9,18 +9,17 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from anyview import imitation, sim
-from anyview.clips.video import write_video
 from anyview.config import Params, load_params
-from anyview.imitation.demonstrations import DEMONSTRATIONS, SPLIT, imitated_demonstrations
-from anyview.imitation.evaluation import evaluate_group, groups_of
-from anyview.imitation.policies import save_policies
+from anyview.evaluation.demonstrations import DEMONSTRATIONS, SPLIT, imitated_demonstrations
+from anyview.evaluation.runs import evaluate_group, groups_of
+from anyview.learners.common.policies import save_policies
+from anyview.pusher.contexts import sample_contexts
 from anyview.runtime.errors import AnyviewError, run_stage
 from anyview.runtime.outputs import whole_folder, write_atomically
 from anyview.runtime.scratch import content_key, scratch_folder
-from anyview.runtime.seeds import stream
 from anyview.runtime.workers import run_units
-from anyview.sim.contexts import sample_contexts
+from anyview.seeds import stream
+from anyview.video.files import write_video
 
 RATE = 10.0  # frames a second
 
@@ -67,9 +66,7 @@ def main(arguments: list[str]) -> None:
 def _key(params: Params, name: str) -> str:
     """Changes with everything that the checkpoints of a cell depend on."""
     values = params.imitation.model_dump(exclude={"cells"}) | params.imitation.cells[name].model_dump()
-    packages = (Path(sim.__file__).parent, Path(imitation.__file__).parent)
-    files = [path for package in packages for path in package.glob("*.py")]
-    files += [DEMONSTRATIONS / "files.csv", SPLIT]
+    files = [DEMONSTRATIONS / "files.csv", SPLIT]
     source = Path(params.imitation.cells[name].source)
     files += sorted(source.iterdir()) if source.is_dir() else []
     return content_key([name, params.base.seed, params.sim.model_dump(), values], files)

@@ -3,9 +3,8 @@
 import shutil
 from pathlib import Path
 
-from anyview import clips
-from anyview.clips import ingest
 from anyview.config import load_params
+from anyview.ingest import clips as ingest
 from anyview.runtime.errors import AnyviewError, run_stage
 from anyview.runtime.outputs import whole_folder
 from anyview.runtime.progress import track
@@ -23,8 +22,7 @@ def main(arguments: list[str]) -> None:
     params = load_params().real
     source, limits = SOURCES[params.source], params.ingest
     candidates = ingest.read_candidates(source)
-    code = [Path(__file__), *Path(clips.__file__).parent.glob("*.py")]
-    scratch = scratch_folder("checkpoints", content_key(limits.model_dump(), code))
+    scratch = scratch_folder("checkpoints", content_key(["ingest", limits.model_dump()]))
 
     verdicts = []
     units = [(source, scratch, candidate, limits) for candidate in candidates]

@@ -11,19 +11,18 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from anyview import sim
-from anyview.clips.store import StoredFile, stored_file, write_set, write_shard
 from anyview.config import load_params
+from anyview.pusher.batch import TOLERANCE
+from anyview.pusher.contexts import Kind, sample_contexts
+from anyview.pusher.expert import roll_out
+from anyview.pusher.render import renderer
 from anyview.runtime.errors import AnyviewError, run_stage
 from anyview.runtime.outputs import whole_folder, write_atomically
 from anyview.runtime.progress import track
 from anyview.runtime.scratch import content_key, scratch_folder
-from anyview.runtime.seeds import stream
 from anyview.runtime.workers import run_units
-from anyview.sim.batch import TOLERANCE
-from anyview.sim.contexts import Kind, sample_contexts
-from anyview.sim.expert import roll_out
-from anyview.sim.render import renderer
+from anyview.seeds import stream
+from anyview.video.sets import StoredFile, stored_file, write_set, write_shard
 
 
 def simulate_shard(
@@ -79,9 +78,8 @@ def main(arguments: list[str]) -> None:
         raise AnyviewError("usage: python stages/simulate.py diverse|narrow")
     kind: Kind = "diverse" if arguments == ["diverse"] else "narrow"
     demos, shard = getattr(params.simulate, kind).demos, params.simulate.shard
-    code = [Path(__file__), *Path(sim.__file__).parent.glob("*.py")]
-    values = [params.base.seed, kind, shard, params.sim.image_size]
-    folder = scratch_folder("checkpoints", content_key(values, code))
+    values = ["simulate", params.base.seed, kind, shard, params.sim.image_size]
+    folder = scratch_folder("checkpoints", content_key(values))
 
     counts = [min(shard, demos - first) for first in range(0, demos, shard)]
     units = [

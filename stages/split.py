@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from anyview.clips.manifests import read_table
-from anyview.clips.splits import split_pairs
 from anyview.config import load_params
 from anyview.runtime.errors import AnyviewError, run_stage
 from anyview.runtime.outputs import write_atomically
+from anyview.video.manifests import read_table
+from anyview.video.splits import split_pairs
 
 SETS = {
     "sim-diverse": Path("data/sim/diverse/manifest.csv"),

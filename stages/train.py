@@ -7,9 +7,9 @@ from pathlib import Path
 
 from anyview.config import EmbeddingCell, load_params
 from anyview.runtime.errors import AnyviewError, run_stage
-from anyview.translation.sampling import check_dataset
-from anyview.translation.trainer import Recipe
-from anyview.translation.training import train_translator
+from anyview.training.sampling import check_dataset
+from anyview.training.trainer import Recipe
+from anyview.training.training import train_translator
 
 
 def main(arguments: list[str]) -> None:
@@ -23,7 +23,7 @@ def main(arguments: list[str]) -> None:
     check_dataset(name, cell.dataset, arguments[1:])
     output = Path("data/models") / name
     if isinstance(cell, EmbeddingCell):
-        from anyview.translation.embedding import train_embedding
+        from anyview.embedding.embedding import train_embedding
 
         train_embedding(name, cell, params.translation.training, params.base.seed, output)
     else:

@@ -5,13 +5,13 @@ Usage: python stages/translate.py CELL [DATASET]
 
 from pathlib import Path
 
+from anyview.assessment.evaluation import evaluate
 from anyview.config import TranslatorCell, load_params
 from anyview.runtime.errors import AnyviewError, run_stage
 from anyview.runtime.outputs import whole_folder
-from anyview.runtime.seeds import stream
-from anyview.translation.evaluation import evaluate
-from anyview.translation.sampling import check_dataset, open_dataset
-from anyview.translation.weights import load_translator
+from anyview.seeds import stream
+from anyview.training.sampling import check_dataset, open_dataset
+from anyview.translator.weights import load_translator
 
 
 def main(arguments: list[str]) -> None:

@@ -78,8 +78,8 @@ def test_the_committed_params_are_sound():
         ),
         (
             "imitation.cells.gail.source",
-            "src/anyview/imitation/tpil.py",
-            "imitation.cells.gail.source: for the reward gail it must be src/anyview/imitation/gail.py, got",
+            "src/anyview/adversarial/tpil.py",
+            "imitation.cells.gail.source: for the reward gail it must be src/anyview/adversarial/gail.py",
         ),
         (
             "split.real",

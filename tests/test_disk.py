@@ -12,7 +12,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from tests.clips.raw_clips import pictures, write_raw
+from tests.ingest.raw_clips import pictures, write_raw
 from tests.long_stages import digests
 
 PR_CAPBSET_DROP, CAP_DAC_OVERRIDE = 24, 1

@@ -10,7 +10,7 @@ import pytest
 import typer
 from dvc.cli import parse_args
 
-from anyview import cli
+from anyview.cli.main import main as cli
 from anyview.config import load_params
 from anyview.report.review import flat
 
@@ -79,7 +79,7 @@ def test_paths_in_the_text_exist(path):
 
 @each_document
 def test_names_in_the_code_exist(path):
-    """`anyview.runtime.seeds.stream` and `Class.field`."""
+    """`anyview.seeds.stream` and `Class.field`."""
     for name in re.findall(r"`(anyview(?:\.\w+)+)(?:\([^`]*\))?`", prose(path)):
         parts = name.split(".")
         module = next(

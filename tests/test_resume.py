@@ -106,7 +106,7 @@ def test_changed_code_starts_afresh(study, begun):
         if number == 1:
             wait_for_a_checkpoint(study, process)
         stop(process, signal.SIGKILL)
-        with (study.folder / "src/anyview/runtime/seeds.py").open("a") as file:
+        with (study.folder / "src/anyview/seeds.py").open("a") as file:
             file.write("# other streams\n")
 
 

@@ -233,7 +233,7 @@ def test_outputs_are_one_folder_or_table_a_cell():
     "path", sorted((ROOT / "tests").rglob("test_*.py")), ids=lambda path: str(path.relative_to(ROOT))
 )
 def test_tests_mirror_the_source(path):
-    """tests/sim/test_batch.py tests src/anyview/sim/batch.py, a module or a package: easy to find."""
+    """tests/sim/test_batch.py tests src/anyview/pusher/batch.py, a module or a package: easy to find."""
     relative = path.relative_to(ROOT / "tests")
     if len(relative.parts) == 1 or relative.name in TESTS_OF_A_WHOLE:
         return

@@ -7,6 +7,6 @@ from gymnasium import register
 
 register(
     "anyview/Pusher3DoF-v0",
-    entry_point="anyview.sim.env:PusherEnv",
-    vector_entry_point="anyview.sim.env:PusherVectorEnv",
+    entry_point="anyview.environments.pusher:PusherEnv",
+    vector_entry_point="anyview.environments.pusher:PusherVectorEnv",
 )

@@ -1,5 +1,5 @@
 """``python -m anyview``."""
 
-from anyview.cli import main
+from anyview.cli.main import main
 
 main()

@@ -179,7 +179,7 @@ class Training(Block):
         description="the rate stays, or falls to 0 along a cosine"
     )
     precision: Literal["bfloat16", "float32"] = Field(
-        description="of the matrix products; weights stay float32"
+        description="of the matrix products, bfloat16 only where the processor has it; weights stay float32"
     )
     validation_every: Count = Field(description="iterations between validations")
     validation_pairs: Count = Field(description="frame pairs in the fixed validation set")
@@ -373,7 +373,7 @@ def load_params(path: Path = Path("params.yaml")) -> Params:
 def _sources(cell: ImitationCell, translation: Translation) -> list[str]:
     """What the reward of ``cell`` can be made from."""
     if cell.reward in _LEARNED:
-        return [f"src/anyview/imitation/{cell.reward}.py"]
+        return [f"src/anyview/adversarial/{cell.reward}.py"]
     method = "time-contrastive" if cell.reward == "embedding" else "translator"
     return [f"data/models/{key}" for key, model in translation.cells.items() if model.method == method]
 

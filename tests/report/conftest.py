@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from anyview.clips.store import write_shard
-from anyview.clips.video import write_video
 from anyview.config import Params, load_params
+from anyview.video.files import write_video
+from anyview.video.sets import write_shard
 
 ROOT = Path(__file__).parents[2]
 RUNS = 15

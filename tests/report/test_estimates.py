@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from anyview.imitation.statistics import mcnemar_exact, wilson_interval
+from anyview.analysis.statistics import mcnemar_exact, wilson_interval
 from anyview.report.estimates import Estimator, proportion
 
 NORMAL_97_5 = 1.959963984540054

@@ -8,7 +8,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from anyview.report.commands import review
+from anyview.cli.review import review
 from anyview.report.review import MetricChange, Reading, compare
 from anyview.report.revisions import Revision, find_revision
 from anyview.runtime.errors import AnyviewError
@@ -20,7 +20,7 @@ stages:
   imitate@ours:
     cmd: python stages/imitate.py ours
     deps:
-    - {path: src/anyview/imitation/ddpg.py, hash: md5, md5: aaa, size: 1}
+    - {path: src/anyview/learners/ddpg.py, hash: md5, md5: aaa, size: 1}
     params:
       params.yaml:
         imitation.reward: {phi: PHI}
@@ -88,7 +88,7 @@ def test_each_kind_of_change_is_listed(project):
     assert "**0.8 [0.55, 0.93]** | **0.2 [0.07, 0.45]** | **-0.6**" in output
     head = git(project, "rev-parse", "HEAD")
     assert f"`{head[:10]}:metrics/plots/strip-sim.png` | `metrics/plots/strip-sim.png`" in output
-    row = "| `imitate@ours` | `imitation.reward.phi`, `src/anyview/imitation/ddpg.py` | changed |"
+    row = "| `imitate@ours` | `imitation.reward.phi`, `src/anyview/learners/ddpg.py` | changed |"
     assert row in output
     assert "`runs`" not in output
     assert "Unchanged: 1." in output

@@ -44,7 +44,7 @@ def test_a_probe_says_why_not():
 
 
 def test_the_choice_is_made_once_and_inherited():
-    script = "import os, anyview.sim, mujoco; mujoco.GLContext(8, 8); print(os.environ['ANYVIEW_GL'])"
+    script = "import os, anyview.pusher, mujoco; mujoco.GLContext(8, 8); print(os.environ['ANYVIEW_GL'])"
     first = python(script)
     assert first.stdout.strip() in BACKENDS, first.stderr
     second = python(script, ANYVIEW_GL=first.stdout.strip(), MUJOCO_GL="nonsense")
@@ -52,7 +52,7 @@ def test_the_choice_is_made_once_and_inherited():
 
 
 RENDERERS = {
-    "the pusher": "from anyview.sim.render import renderer; renderer(64)",
+    "the pusher": "from anyview.pusher.render import renderer; renderer(64)",
     "MuJoCo's own": (
         "from anyview.runtime.graphics import load_mujoco; mujoco = load_mujoco();"
         "mujoco.Renderer(mujoco.MjModel.from_xml_string('<mujoco/>'), 8, 8)"
@@ -72,7 +72,7 @@ def test_whoever_renders_without_opengl_is_told_what_to_install(no_gl, name):
 
 
 def test_physics_needs_no_opengl(no_gl):
-    done = python("import anyview.sim.batch; print('imported')", **no_gl)
+    done = python("import anyview.pusher.batch; print('imported')", **no_gl)
     assert done.stdout == "imported\n", done.stderr
 
 

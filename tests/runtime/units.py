@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from anyview.runtime.errors import AnyviewError
-from anyview.runtime.seeds import stream
+from anyview.seeds import stream
 
 
 def hold(folder: str, number: int) -> None:

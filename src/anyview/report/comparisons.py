@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from anyview.imitation.statistics import mcnemar_exact
+from anyview.analysis.statistics import mcnemar_exact
 from anyview.report.cells import FACTORIAL, OURS, in_order
 from anyview.report.estimates import Estimate, Estimator
 from anyview.report.inputs import Evaluation

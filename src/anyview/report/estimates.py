@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anyview.imitation.statistics import bootstrap_interval, quantile_interval, resampled, wilson_interval
-from anyview.runtime.seeds import stream
+from anyview.analysis.statistics import bootstrap_interval, quantile_interval, resampled, wilson_interval
+from anyview.seeds import stream
 
 
 @dataclass(frozen=True)

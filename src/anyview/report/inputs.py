@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from anyview.clips.manifests import read_table
-from anyview.clips.splits import read_split
-from anyview.clips.video import read_video
 from anyview.config import Params
 from anyview.runtime.errors import AnyviewError
+from anyview.video.files import read_video
+from anyview.video.manifests import read_table
+from anyview.video.splits import read_split
 
 LOSSES = ("loss", "translation", "reconstruction", "alignment", "psnr", "ssim")
 RETURNS = ("return_policy", "return_still", "return_arm_only", "return_expert")

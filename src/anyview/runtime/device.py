@@ -23,6 +23,16 @@ def torch_device() -> "torch.device":
     return torch.device("cuda" if wish != "cpu" and torch.cuda.is_available() else "cpu")
 
 
+def computes_bfloat16(device: "torch.device") -> bool:
+    """Whether ``device`` has instructions for bfloat16 products; without them these are 10 times slower."""
+    import torch
+
+    if device.type != "cpu":
+        return True
+    found = torch.cpu.get_capabilities()
+    return any(found.get(name, False) for name in ("avx512_bf16", "amx_bf16"))
+
+
 def use_threads(count: int) -> None:
     """Fix the intra-op threads: reductions split by thread count, so a fixed count keeps the bytes fixed."""
     import torch

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 KINDS = ("checkpoints", "frames")
+_AFTERWARDS = ("analysis", "report", "review", "cli")  # folders whose code only looks at what is finished
 
 # Folders of checkpoints that this process works in, each open and so locked until the process ends.
 _claimed: dict[Path, int] = {}
@@ -88,7 +89,9 @@ def _is_claimed(folder: Path) -> bool:
 def _code_key() -> str:
     """A key of every module that can change what is half done: the report comes after all of that."""
     package = Path(__file__).parents[1]
-    modules = [path for path in package.rglob("*.py") if "report" not in path.relative_to(package).parts]
+    modules = [
+        path for path in package.rglob("*.py") if path.relative_to(package).parts[0] not in _AFTERWARDS
+    ]
     script = getattr(sys.modules["__main__"], "__file__", None)
     paths = [*modules, Path(script)] if script else modules
     return content_key([str(path.relative_to(package)) for path in sorted(modules)], paths)[:8]

@@ -1,0 +1,1 @@
+"""Rewards that a discriminator learns while the agent does: GAIL and TPIL."""

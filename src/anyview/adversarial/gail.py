@@ -1,0 +1,60 @@
+"""GAIL on images (Ho and Ermon 2016): a discriminator of single frames and their time; reward -log(1 - D)."""
+
+from collections.abc import Mapping, Sequence
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from anyview import config
+from anyview.adversarial.discriminators import ClipSet, Discriminator, LearnedReward, Views, cross_entropy
+from anyview.learners.common.policies import with_time_bumps
+
+_CHANNELS = (16, 32, 32)
+_WIDTH = 64
+_BUMPS = 10
+_LEAK = 0.2
+
+
+class FrameDiscriminator(Discriminator):
+    """D(o_t, t): three strided convolutions on the frame at half its size; time joins the connected layer.
+
+    Time comes as overlapping bumps beside the number: from the number alone the discriminator learns many
+    times slower that the same frame is the expert's at one time and not at another.
+    """
+
+    def __init__(self, image_size: int):
+        super().__init__()
+        layers: list[nn.Module] = [nn.AvgPool2d(2)]
+        before, side = 3, image_size // 2
+        for channels in _CHANNELS:
+            layers += [nn.Conv2d(before, channels, 3, stride=2, padding=1), nn.LeakyReLU(_LEAK)]
+            before, side = channels, -(-side // 2)
+        self.features = nn.Sequential(*layers, nn.Flatten())
+        self.hidden = nn.Linear(before * side**2 + 1 + _BUMPS, _WIDTH)
+        self.output = nn.Linear(_WIDTH, 1)
+
+    def logits(self, views: Views) -> Tensor:
+        """log D/(1 - D), (B,)."""
+        time = with_time_bumps(2 * views.time[:, None] - 1, _BUMPS)
+        inputs = torch.cat([self.features(views.now), time], dim=1)
+        return self.output(F.leaky_relu(self.hidden(inputs), _LEAK)).squeeze(1)
+
+    def reward(self, logits: Tensor) -> Tensor:
+        """-log(1 - D)."""
+        return F.softplus(logits)
+
+    def loss(self, views: Mapping[str, Views]) -> Tensor:
+        """-E_expert[log D] - E_agent[log(1 - D)]."""
+        return cross_entropy(self.logits(views["expert"]), 1.0) + cross_entropy(
+            self.logits(views["agent"]), 0.0
+        )
+
+
+def gail_reward(
+    params: config.Discriminator, seed: int, runs: Sequence[int], experts: Sequence[ClipSet], episodes: int
+) -> LearnedReward:
+    """The reward of ``runs``, each with its set of expert clips; learns every ``episodes`` episodes."""
+    size = experts[0].frames.shape[2]
+    sets = [{"expert": clips} for clips in experts]
+    return LearnedReward(lambda: FrameDiscriminator(size), params, seed, runs, sets, episodes)

@@ -1,0 +1,133 @@
+"""Third-person imitation (Stadie et al. 2017): is it the expert's motion, whichever view it is seen from?
+
+Features of a frame serve two heads: the class head tells expert from not, on a pair of frames; the domain
+head tells the expert's view from the agent's, on one frame, and its gradient is reversed on its way into the
+features. So that the view does not give the class away, there is a third set: random motion in the expert's
+views ("bystander").
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from anyview import config
+from anyview.adversarial.discriminators import ClipSet, Discriminator, LearnedReward, Views, cross_entropy
+from anyview.pusher.batch import ACTION_SIZE, ACTIONS, PusherBatch
+from anyview.pusher.contexts import Context
+
+_CHANNELS = 5
+_WIDTH = 128
+_LEAK = 0.2
+
+
+class ReverseGradient(torch.autograd.Function):
+    """The identity, whose gradient is multiplied by -``weight`` (Ganin and Lempitsky 2015)."""
+
+    @staticmethod
+    def forward(ctx: Any, x: Tensor, weight: float) -> Tensor:
+        ctx.weight = weight
+        return x.view_as(x)
+
+    @staticmethod
+    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None]:
+        return -ctx.weight * gradient, None
+
+
+class PairDiscriminator(Discriminator):
+    """Two 3x3 convolutions of 5 channels, each with 2x2 pooling; heads with one connected layer of 128."""
+
+    lag = 3
+
+    def __init__(self, image_size: int, domain_weight: float):
+        super().__init__()
+        self._domain_weight = domain_weight
+        self.features = nn.Sequential(
+            nn.Conv2d(3, _CHANNELS, 3, padding=1),
+            nn.MaxPool2d(2),
+            nn.LeakyReLU(_LEAK),
+            nn.Conv2d(_CHANNELS, _CHANNELS, 3, padding=1),
+            nn.MaxPool2d(2),
+            nn.LeakyReLU(_LEAK),
+            nn.Flatten(),
+        )
+        size = _CHANNELS * (image_size // 4) ** 2
+        self.class_head = _head(2 * size)
+        self.domain_head = _head(size)
+
+    def logits(self, views: Views) -> Tensor:
+        """log P(expert)/P(not expert), (B,)."""
+        return self._logits(self.features(views.before), self.features(views.now))
+
+    def reward(self, logits: Tensor) -> Tensor:
+        """P(expert)."""
+        return torch.sigmoid(logits)
+
+    def loss(self, views: Mapping[str, Views]) -> Tensor:
+        """Cross-entropy of both heads; in each, both labels weigh the same."""
+        before = {name: self.features(batch.before) for name, batch in views.items()}
+        now = {name: self.features(batch.now) for name, batch in views.items()}
+        classes = {name: self._logits(before[name], now[name]) for name in views}
+        domains = {name: self._domain(features) for name, features in now.items()}
+        not_expert = cross_entropy(torch.cat([classes["agent"], classes["bystander"]]), 0.0)
+        expert_view = cross_entropy(torch.cat([domains["expert"], domains["bystander"]]), 1.0)
+        return (
+            cross_entropy(classes["expert"], 1.0)
+            + not_expert
+            + expert_view
+            + cross_entropy(domains["agent"], 0.0)
+        )
+
+    def accuracies(self, views: Mapping[str, Views]) -> dict[str, Tensor]:
+        """Of the class head by set, and of the domain head with both domains weighing the same."""
+        told = {
+            name: ((self._domain(self.features(batch.now)) > 0) == (name != "agent")).float().mean()
+            for name, batch in views.items()
+        }
+        expert_view = (told["expert"] + told["bystander"]) / 2
+        return super().accuracies(views) | {"domain_accuracy": (expert_view + told["agent"]) / 2}
+
+    def _logits(self, before: Tensor, now: Tensor) -> Tensor:
+        return self.class_head(torch.cat([before, now], dim=1)).squeeze(1)
+
+    def _domain(self, features: Tensor) -> Tensor:
+        """log P(expert's view)/P(agent's view), (B,)."""
+        return self.domain_head(ReverseGradient.apply(features, self._domain_weight)).squeeze(1)
+
+
+def _head(inputs: int) -> nn.Sequential:
+    return nn.Sequential(nn.Linear(inputs, _WIDTH), nn.LeakyReLU(_LEAK), nn.Linear(_WIDTH, 1))
+
+
+def tpil_reward(
+    params: config.Discriminator,
+    seed: int,
+    runs: Sequence[int],
+    experts: Sequence[ClipSet],
+    bystanders: Sequence[ClipSet],
+    episodes: int,
+) -> LearnedReward:
+    """The reward of ``runs``, each with expert and bystander clips; learns every ``episodes`` episodes."""
+    size = experts[0].frames.shape[2]
+    sets = [
+        {"expert": expert, "bystander": bystander}
+        for expert, bystander in zip(experts, bystanders, strict=True)
+    ]
+    return LearnedReward(
+        lambda: PairDiscriminator(size, params.domain_weight), params, seed, runs, sets, episodes
+    )
+
+
+def random_motion(
+    contexts: Sequence[Context], rng: np.random.Generator, std: float, control: str, image_size: int
+) -> np.ndarray:
+    """Clips (N, T + 1, H, W, 3), one in each context, of an arm whose actions are N(0, ``std``^2)."""
+    batch = PusherBatch(contexts, control, image_size)
+    batch.reset()
+    frames = [batch.render()]
+    for _ in range(ACTIONS):
+        batch.step(std * rng.standard_normal((batch.count, ACTION_SIZE)))
+        frames.append(batch.render())
+    return np.stack(frames, axis=1)

@@ -1,0 +1,1 @@
+"""Outputs of the stages as tidy tables: every statistic is computed here, once."""

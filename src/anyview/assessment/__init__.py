@@ -1,0 +1,1 @@
+"""What a trained translator makes of held-out clips."""

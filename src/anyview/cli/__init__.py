@@ -1,0 +1,1 @@
+"""The command `anyview`, and what stands behind it alone: recording, preview, profiles, doctor."""

@@ -1,0 +1,53 @@
+"""The command `anyview watch`."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from anyview.video.files import Codec
+
+POLICIES = Path("data/policies")
+CODECS: dict[str, Codec] = {".mp4": "XVID", ".avi": "FFV1"}
+
+
+def watch(
+    cell: Annotated[str, typer.Argument(help="A method that was evaluated, such as ours.")],
+    run: Annotated[int, typer.Option("--run", min=0, help="Which of its runs.")] = 0,
+    output: Annotated[Path, typer.Option("--output", "-o", help="The video, .mp4 or .avi.")] = Path(
+        "watch.mp4"
+    ),
+    size: Annotated[int, typer.Option("--size", min=64, max=1024, help="Width and height in pixels.")] = 512,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for a script.")] = False,
+) -> None:
+    """Watch a trained policy act, seen from its own camera."""
+    import numpy as np
+
+    from anyview.learners.common.policies import load_policy
+    from anyview.pusher.batch import ACTIONS, TOLERANCE, PusherBatch
+    from anyview.runtime.errors import AnyviewError
+    from anyview.video.files import write_video
+
+    if output.suffix not in CODECS:
+        raise AnyviewError(f"{output}: the output must end in {' or '.join(CODECS)}")
+    if size % 2:
+        raise AnyviewError(f"--size {size}: must be even")
+    there = sorted(folder.name for folder in POLICIES.glob("*/"))
+    if cell not in there:
+        raise AnyviewError(f"{cell}: no such method was evaluated; there are {', '.join(there) or 'none'}")
+    policy = load_policy(POLICIES / cell, run)
+    pusher = PusherBatch([policy.context], policy.control, size)
+    observation = pusher.reset()[0]
+    frames = [pusher.render()[0]]
+    for _ in range(ACTIONS):
+        observation = pusher.step(policy.act(observation)[None])[0]
+        frames.append(pusher.render()[0])
+    write_video(output, np.stack(frames), 10.0, CODECS[output.suffix])
+    distance = float(pusher.distance()[0])
+    success = distance < TOLERANCE
+    if as_json:
+        print(json.dumps({"output": str(output), "final_distance": distance, "success": success}))
+        return
+    verdict = "success" if success else "no success"
+    print(f"{output}: {cell} run {run} leaves the object {100 * distance:.1f} cm from the goal: {verdict}")

@@ -1,0 +1,1 @@
+"""The time-contrastive embedding of the `tcn` baseline."""

@@ -1,0 +1,155 @@
+"""The pusher as Gymnasium environments: ``anyview/Pusher3DoF-v0``, single and vectorised.
+
+The reward here is the negative distance from object to goal in metres, for tests and baselines that know the
+true state; imitation replaces it with what the camera sees. Episodes are truncated after 49 actions.
+"""
+
+from collections.abc import Sequence
+from typing import Any, get_args
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from anyview.pusher.batch import (
+    ACTION_SIZE,
+    ACTIONS,
+    OBSERVATION_LIMIT,
+    OBSERVATION_SIZE,
+    TOLERANCE,
+    PusherBatch,
+)
+from anyview.pusher.contexts import Context, Kind, sample_contexts
+
+_OBSERVATION_SPACE = gym.spaces.Box(-OBSERVATION_LIMIT, OBSERVATION_LIMIT, (OBSERVATION_SIZE,), np.float32)
+_ACTION_SPACE = gym.spaces.Box(-1.0, 1.0, (ACTION_SIZE,), np.float32)
+_METADATA = {"render_modes": ["rgb_array"], "render_fps": 10}
+
+
+class PusherEnv(gym.Env):
+    """One pusher. A reset draws a new context of ``kind``, unless ``context`` fixes it."""
+
+    metadata: dict[str, Any] = _METADATA
+
+    def __init__(
+        self,
+        context: Context | None = None,
+        kind: Kind = "diverse",
+        control: str = "twist",
+        image_size: int = 64,
+        render_mode: str | None = None,
+    ):
+        _check_choices(kind, control)
+        self.observation_space = _OBSERVATION_SPACE
+        self.action_space = _ACTION_SPACE
+        self.render_mode = render_mode
+        self._context, self._kind, self._control, self._image_size = context, kind, control, image_size
+        self._batch: PusherBatch | None = None
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
+        """Start an episode; ``options={"context": ...}`` chooses its context."""
+        super().reset(seed=seed)
+        context = (options or {}).get("context", self._context) or _draw(self.np_random, self._kind)
+        self._batch = PusherBatch([context], self._control, self._image_size)
+        return self._batch.reset()[0], _info(self._batch, 0)
+
+    def step(self, action: np.ndarray):
+        """Act for 0.1 s."""
+        assert self._batch is not None, "reset comes first"
+        observation = self._batch.step(np.asarray(action)[None])[0]
+        info = _info(self._batch, 0)
+        return observation, -info["distance"], False, self._batch.steps >= ACTIONS, info
+
+    def render(self) -> np.ndarray | None:
+        """The context's camera image (H, W, 3) uint8, where ``render_mode`` is "rgb_array"."""
+        if self.render_mode is None:
+            return None
+        assert self._batch is not None, "reset comes first"
+        return self._batch.render()[0]
+
+
+class PusherVectorEnv(VectorEnv):
+    """``num_envs`` pushers on one ``mujoco.batch.Batch``, equal step for step to as many single ones."""
+
+    metadata: dict[str, Any] = {**_METADATA, "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        contexts: Sequence[Context] | None = None,
+        kind: Kind = "diverse",
+        control: str = "twist",
+        image_size: int = 64,
+        render_mode: str | None = None,
+    ):
+        if contexts is not None and len(contexts) != num_envs:
+            raise ValueError(f"{len(contexts)} contexts for {num_envs} environments")
+        _check_choices(kind, control)
+        self.num_envs = num_envs
+        self.single_observation_space, self.single_action_space = _OBSERVATION_SPACE, _ACTION_SPACE
+        self.observation_space = batch_space(_OBSERVATION_SPACE, num_envs)
+        self.action_space = batch_space(_ACTION_SPACE, num_envs)
+        self.render_mode = render_mode
+        self._contexts, self._kind, self._control, self._image_size = contexts, kind, control, image_size
+        self._generators: list[np.random.Generator] = []
+        self._batch: PusherBatch | None = None
+
+    def reset(self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None):
+        """Start an episode everywhere; an integer ``seed`` seeds environment i with ``seed + i``."""
+        if seed is not None or not self._generators:
+            seeds = [seed + i if isinstance(seed, int) else seed for i in range(self.num_envs)]
+            if isinstance(seed, Sequence):
+                seeds = list(seed)
+            self._generators = [gym.utils.seeding.np_random(each)[0] for each in seeds]  # type: ignore[arg-type]
+        contexts = self._contexts or [_draw(generator, self._kind) for generator in self._generators]
+        self._batch = PusherBatch(contexts, self._control, self._image_size)
+        return self._batch.reset(), self._info()
+
+    def step(self, actions: np.ndarray):
+        """Act for 0.1 s everywhere; the step after the last one of an episode resets instead."""
+        assert self._batch is not None, "reset comes first"
+        ended = self._batch.steps >= ACTIONS
+        never = np.zeros(self.num_envs, bool)
+        if ended:
+            observations, info = self.reset()
+            return observations, np.zeros(self.num_envs), never, never.copy(), info
+        observations = self._batch.step(actions)
+        truncated = np.full(self.num_envs, self._batch.steps >= ACTIONS)
+        return observations, -self._batch.distance(), never, truncated, self._info()
+
+    def render(self) -> tuple[np.ndarray, ...] | None:
+        """Every context's camera image, where ``render_mode`` is "rgb_array"."""
+        if self.render_mode is None:
+            return None
+        assert self._batch is not None, "reset comes first"
+        return tuple(self._batch.render())
+
+    def _info(self) -> dict[str, Any]:
+        assert self._batch is not None
+        distance = self._batch.distance()
+        everywhere = np.ones(self.num_envs, bool)
+        return {
+            "distance": distance,
+            "_distance": everywhere,
+            "is_success": distance < TOLERANCE,
+            "_is_success": everywhere.copy(),
+        }
+
+
+def _draw(rng: np.random.Generator, kind: Kind) -> Context:
+    return sample_contexts(rng, 1, kind)[0][0]
+
+
+def _check_choices(kind: str, control: str) -> None:
+    for name, value, choices in (
+        ("kind", kind, get_args(Kind)),
+        ("control", control, ("twist", "torque")),
+    ):
+        if value not in choices:
+            raise ValueError(f"{name} {value!r}: must be {' or '.join(choices)}")
+
+
+def _info(batch: PusherBatch, index: int) -> dict[str, Any]:
+    distance = float(batch.distance()[index])
+    return {"distance": distance, "is_success": distance < TOLERANCE}

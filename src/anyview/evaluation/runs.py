@@ -1,0 +1,188 @@
+"""The evaluation of a method: runs in lockstep, each a policy of its own in a context of its own."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from anyview.config import Params
+from anyview.evaluation.methods import Group, Scoring, make_learner, make_reward
+from anyview.learners.common.interfaces import Arrays, Learner, RewardSource
+from anyview.pusher.batch import ACTIONS, FRAMES, TOLERANCE, PusherBatch
+from anyview.pusher.contexts import Context
+from anyview.pusher.expert import roll_out
+from anyview.pusher.render import renderer
+from anyview.runtime.checkpoints import Checkpoints
+from anyview.runtime.device import use_threads
+from anyview.runtime.progress import track
+
+GROUP = 8  # runs in lockstep at most: a fixed number, so that no result depends on how many workers there are
+_POINTS = 50  # of a learning curve
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a group of R runs leaves.
+
+    ``runs`` has a row per run, ``curve`` one per run and point of its curve, ``policies`` weights (R, ...),
+    and ``rollouts`` (R, 50, H, 2 W, 3) the agent's frames with the imitated demonstration to their right.
+    """
+
+    runs: pd.DataFrame
+    curve: pd.DataFrame
+    policies: Arrays
+    rollouts: np.ndarray
+
+
+def groups_of(runs: int) -> list[range]:
+    """Runs 0 to ``runs`` - 1 in groups of at most ``GROUP``: 15 are 8 and 7."""
+    return [range(start, min(start + GROUP, runs)) for start in range(0, runs, GROUP)]
+
+
+def evaluate_group(
+    name: str,
+    params: Params,
+    runs: Sequence[int],
+    contexts: Sequence[Context],
+    demonstrations: np.ndarray,
+    scratch: Path,
+) -> Result:
+    """Train and evaluate the ``runs`` of cell ``name``, one context each; continues from ``scratch``.
+
+    ``demonstrations`` (m, 50, H, W, 3) uint8 RGB are the expert's clips in other contexts.
+    """
+    use_threads(1)
+    positions, _ = roll_out(contexts)
+    own = _film(params, contexts, positions)
+    group = Group(params, params.imitation.cells[name], runs, contexts, demonstrations, own)
+    learner, scoring = make_learner(group), make_reward(group)
+    label = f"{name}, runs {runs[0]} to {runs[-1]}"
+    curve = _train(label, group, learner, scoring, Checkpoints(scratch))
+
+    agent, distance = _perform(group, learner)
+    columns = {
+        "run": list(runs),
+        "success": (distance < TOLERANCE).astype(int),
+        "final_distance": distance,
+        "return_policy": _returns(scoring, agent),
+    }
+    if scoring.judges:
+        without_object = positions.copy()
+        without_object[:, :, 3:] = positions[:, :1, 3:]
+        columns |= {
+            "return_still": _returns(scoring, np.repeat(own[:, :1], FRAMES, axis=1)),
+            "return_arm_only": _returns(scoring, _film(params, contexts, without_object)),
+            "return_expert": _returns(scoring, own),
+        }
+    rollouts = np.concatenate([agent, scoring.shown], axis=3)
+    return Result(pd.DataFrame(columns), curve, learner.policy(), rollouts)
+
+
+def _train(
+    label: str, group: Group, learner: Learner, scoring: Scoring, checkpoints: Checkpoints
+) -> pd.DataFrame:
+    """Train ``learner``; returns the curves: ``iteration, run, final_distance, return`` and measures.
+
+    At each point the policies act once without noise for their distance; the return is what the exploring
+    episodes earned since the point before.
+    """
+    params = group.params.imitation
+    copies = [context for context in group.contexts for _ in range(params.episodes_per_iteration)]
+    control, size = group.params.sim.control, group.params.sim.image_size
+    acting = PusherBatch(copies, control, size)
+    testing = PusherBatch(group.contexts, control, size)
+    points = set(
+        np.linspace(0, params.iterations, min(_POINTS, params.iterations) + 1).round().astype(int)[1:]
+    )
+    rows: list[dict[str, float]] = []
+    since: list[Arrays] = []
+    start = 0
+    if (saved := checkpoints.load()) is not None:
+        start, arrays, state = saved
+        rows, since = state["rows"], [{k: np.array(v) for k, v in each.items()} for each in state["since"]]
+        learner.restore(_part(arrays, "learner."))
+        scoring.reward.restore(_part(arrays, "reward."))
+    with track(label, params.iterations, start) as progress:
+        for iteration in range(start + 1, params.iterations + 1):
+            earned = explore(acting, learner, scoring.reward, len(group.runs))
+            learner.end_iteration()
+            since.append({"return": earned * scoring.units, **scoring.reward.end_iteration()})
+            note = ""
+            if iteration in points:
+                distance = _final_distance(testing, learner)
+                note = f"object {100 * np.median(distance):.1f} cm from the goal"
+                means = {key: np.mean([each[key] for each in since], axis=0) for key in since[0]}
+                for row, run in enumerate(group.runs):
+                    measures = {key: float(mean[row]) for key, mean in means.items()}
+                    rows.append(
+                        {
+                            "iteration": iteration,
+                            "run": run,
+                            "final_distance": float(distance[row]),
+                            **measures,
+                        }
+                    )
+                since = []
+            if checkpoints.due():
+                own = {f"learner.{k}": v for k, v in learner.state().items()}
+                theirs = {f"reward.{k}": v for k, v in scoring.reward.state().items()}
+                pending = [{k: v.tolist() for k, v in each.items()} for each in since]
+                checkpoints.save(iteration, own | theirs, {"rows": rows, "since": pending})
+            progress.advance(note=note)
+    return pd.DataFrame(rows)
+
+
+def explore(batch: PusherBatch, learner: Learner, reward: RewardSource, runs: int) -> np.ndarray:
+    """One iteration's episodes: physics, then one pass of rendering and one batch of encoding a step.
+
+    Returns what they earned (R,), the mean over a run's copies.
+    """
+    shape = (runs, batch.count // runs)
+    observations = batch.reset().reshape(*shape, -1)
+    earned = np.zeros(shape)
+    for step in range(1, ACTIONS + 1):
+        actions = learner.act(observations, explore=True)
+        following = batch.step(actions.reshape(batch.count, -1)).reshape(*shape, -1)
+        frames = batch.render()
+        rewards = reward.step(frames.reshape(*shape, *frames.shape[1:]), step)
+        learner.record(observations, actions, rewards, following, step)
+        earned += rewards
+        observations = following
+    return earned.mean(axis=1)
+
+
+def _final_distance(batch: PusherBatch, learner: Learner) -> np.ndarray:
+    """Metres (R,) from object to goal after an episode without noise."""
+    observations = batch.reset()
+    for _ in range(ACTIONS):
+        observations = batch.step(learner.act(observations[:, None], explore=False)[:, 0])
+    return batch.distance()
+
+
+def _perform(group: Group, learner: Learner) -> tuple[np.ndarray, np.ndarray]:
+    """An episode without noise: frames (R, 50, H, W, 3), and the final distances (R,) in metres."""
+    batch = PusherBatch(group.contexts, group.params.sim.control, group.params.sim.image_size)
+    observations = batch.reset()
+    frames = [batch.render()]
+    for _ in range(ACTIONS):
+        observations = batch.step(learner.act(observations[:, None], explore=False)[:, 0])
+        frames.append(batch.render())
+    return np.stack(frames, axis=1), batch.distance()
+
+
+def _returns(scoring: Scoring, clips: np.ndarray) -> np.ndarray:
+    """Returns (R,) of clips (R, 50, H, W, 3), in the equations' units."""
+    steps = [scoring.reward.step(np.ascontiguousarray(clips[:, None, t]), t)[:, 0] for t in range(1, FRAMES)]
+    return np.sum(steps, axis=0) * scoring.units
+
+
+def _film(params: Params, contexts: Sequence[Context], positions: np.ndarray) -> np.ndarray:
+    """Frames (R, 50, H, W, 3) of ``positions`` (R, 50, 5)."""
+    camera = renderer(params.sim.image_size)
+    return np.stack([camera.render_clip(*each) for each in zip(contexts, positions, strict=True)])
+
+
+def _part(arrays: Arrays, prefix: str) -> Arrays:
+    return {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}

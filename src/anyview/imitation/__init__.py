@@ -1,1 +1,0 @@
-"""Rewards, reinforcement learners and the evaluation over many runs."""

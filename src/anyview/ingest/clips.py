@@ -1,0 +1,176 @@
+"""Raw clips into short, small, even ones: every clip is judged, and none stops the others."""
+
+import hashlib
+import re
+import shutil
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from anyview.config import Ingest
+from anyview.ingest.judge import Refused, read_clip
+from anyview.ingest.raw_manifest import read_raw_manifest
+from anyview.runtime.errors import AnyviewError
+from anyview.runtime.once import once, sha256
+from anyview.runtime.outputs import write_atomically
+from anyview.video.manifests import KINDS, propose_manifest, times_file
+from anyview.video.sets import StoredFile, write_clips, write_set
+
+EXTREME = KINDS[-1]  # clips of scenes that training never sees
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A row of a raw manifest; ``clip`` is the id that the finished clip will have."""
+
+    clip: str
+    file: str
+    pair: str
+    camera: str
+    kind: str
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What became of a candidate: ``reason`` is empty for a finished clip."""
+
+    reason: str
+    stored: dict[str, Any] | None = None
+    pictures: str = ""  # SHA-256 of the finished frames
+
+
+def read_candidates(source: Path) -> list[Candidate]:
+    """The clips that ``source/manifest.csv`` lists.
+
+    Where there is none, one is proposed beside it, and the AnyviewError says so.
+    """
+    path = source / "manifest.csv"
+    if not source.is_dir():
+        raise AnyviewError(
+            f"{source}: no such folder; `anyview record` fills data/real/raw, `dvc repro film` the surrogate"
+        )
+    if not path.exists():
+        proposal = propose_manifest(source)
+        if proposal.empty:
+            raise AnyviewError(f"{source}: no video files; fill it with `anyview record` or your own clips")
+        write_atomically(source / "manifest.proposed.csv", proposal.to_csv(index=False))
+        raise AnyviewError(f"{path}: no such file; check manifest.proposed.csv beside it and rename it")
+    candidates: list[Candidate] = []
+    taken: Counter[str] = Counter()
+    for row in read_raw_manifest(path).to_dict("records"):
+        stem = _slug(row["file"])
+        taken[stem.lower()] += 1
+        clip = stem if taken[stem.lower()] == 1 else f"{stem}~{taken[stem.lower()]}"
+        candidates.append(Candidate(clip, row["file"], row["pair"] or clip, row["camera"], row["kind"]))
+    if not candidates:
+        raise AnyviewError(f"{path}: it lists no clips")
+    return candidates
+
+
+def _slug(file: str) -> str:
+    """A file's path as a plain name."""
+    stem = re.sub(r"\.[^./]*$", "", file)
+    return re.sub(r"[^A-Za-z0-9._-]+", "-", stem).strip(".-")[:80] or "clip"
+
+
+def ingest_clip(source: Path, folder: Path, candidate: Candidate, limits: Ingest) -> Verdict:
+    """Judge one raw clip and write the finished one to ``folder``, unless an earlier try did.
+
+    ``folder`` is scratch space keyed by the limits and the code (see ``runtime.once``).
+    """
+    try:
+        path = _locate(source, candidate)
+        if path.stat().st_size > limits.max_megabytes * 1e6:
+            raise Refused(f"larger than {limits.max_megabytes:g} MB")
+        content = sha256(path)
+        times = path.with_name(times_file(path.name))
+        if times.is_file():
+            content += sha256(times)
+    except Refused as refusal:
+        return Verdict(str(refusal))
+
+    def make() -> tuple[dict[str, Any], list[str]]:
+        try:
+            frames = read_clip(path, limits)
+        except Refused as refusal:
+            return asdict(Verdict(str(refusal))), []
+        stored = write_clips(folder / f"{candidate.clip}.avi", frames[None], limits.rate, "XVID")
+        return asdict(Verdict("", asdict(stored), hashlib.sha256(frames.tobytes()).hexdigest())), [
+            stored.file
+        ]
+
+    name = hashlib.sha256(f"{candidate.clip}/{content}".encode()).hexdigest()[:32]
+    return Verdict(**once(folder, name, make))
+
+
+def _locate(source: Path, candidate: Candidate) -> Path:
+    if candidate.kind not in KINDS:
+        raise Refused(f"kind {candidate.kind!r} is none of {', '.join(KINDS)}")
+    try:
+        path = (source / candidate.file).resolve()
+        inside = path.is_relative_to(source.resolve()) and not Path(candidate.file).is_absolute()
+        if not inside:
+            raise Refused("its path leaves the folder")
+        if not path.exists():
+            raise Refused("no such file")
+        if not path.is_file():
+            raise Refused("not a file")
+        if not path.stat().st_size:
+            raise Refused("an empty file")
+    except (OSError, ValueError, RuntimeError):
+        raise Refused("its path cannot be used") from None
+    return path
+
+
+def settle(candidates: Sequence[Candidate], verdicts: Sequence[Verdict]) -> list[Verdict]:
+    """The final verdicts: duplicates of earlier clips are refused, pairs of which one view alone is extreme,
+    and views whose pair lost its other one.
+
+    A clip whose pair is named once is a single, as declared.
+    """
+    first: dict[str, str] = {}
+    extreme: dict[str, set[bool]] = {}
+    for candidate in candidates:
+        extreme.setdefault(candidate.pair, set()).add(candidate.kind == EXTREME)
+    settled = []
+    for candidate, verdict in zip(candidates, verdicts, strict=True):
+        if not verdict.reason and verdict.pictures in first:
+            verdict = Verdict(f"a duplicate of {first[verdict.pictures]}")
+        elif not verdict.reason and len(extreme[candidate.pair]) > 1:
+            verdict = Verdict(f"only one view of its pair is called {EXTREME}")
+        first.setdefault(verdict.pictures, candidate.file)
+        settled.append(verdict)
+    declared = Counter(candidate.pair for candidate in candidates)
+    left = Counter(c.pair for c, verdict in zip(candidates, settled, strict=True) if not verdict.reason)
+    return [
+        Verdict("the other view of its pair was refused")
+        if not verdict.reason and declared[candidate.pair] > 1 == left[candidate.pair]
+        else verdict
+        for candidate, verdict in zip(candidates, settled, strict=True)
+    ]
+
+
+def publish(
+    output: Path, folder: Path, candidates: Sequence[Candidate], verdicts: Sequence[Verdict]
+) -> tuple[int, int]:
+    """Copy the finished clips from ``folder`` and write their tables and ``refused.csv`` (``file, reason``).
+
+    Returns how many were accepted and refused.
+    """
+    files, rows, refused = [], [], []
+    for candidate, verdict in zip(candidates, verdicts, strict=True):
+        if verdict.stored is None:
+            refused.append((candidate.file, verdict.reason))
+            continue
+        files.append(StoredFile(**verdict.stored))
+        rows.append(asdict(candidate) | {"file": files[-1].file})
+        shutil.copyfile(folder / files[-1].file, output / files[-1].file)
+    write_set(output, pd.DataFrame(rows, columns=list(Candidate.__dataclass_fields__)), files)
+    write_atomically(
+        output / "refused.csv", pd.DataFrame(refused, columns=["file", "reason"]).to_csv(index=False)
+    )
+    return len(files), len(refused)

@@ -1,0 +1,1 @@
+"""Reinforcement learners for many runs in lockstep."""

@@ -1,0 +1,1 @@
+"""What the learners share: their interface, noise, replay, stacked networks, policies on disk."""

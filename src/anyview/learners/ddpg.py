@@ -1,0 +1,194 @@
+"""Deep deterministic policy gradient (Lillicrap et al. 2016) of R policies in lockstep.
+
+Every tensor has a leading dimension R, one row a run, and rows never mix. Shapes below: C copies of a run's
+context act side by side, T steps an episode, O observation and A action sizes, B transitions in a batch.
+
+What is particular here follows from the task, which repeats one episode of fixed length in a fixed context
+under a dense reward:
+
+- time is in the observation and the last step is terminal, so that nothing is bootstrapped beyond it;
+- the networks also see time as a row of overlapping bumps, so that a correction at one step leaves others be;
+- the policy's loss penalises the squares of what enters its tanh (Andrychowicz et al. 2017, appendix A): a
+  saturated action has no gradient, and early, wrong critics drive actions there for good;
+- all updates of an iteration follow its episodes, and half of each batch comes from the newest episodes: the
+  critic must be sharp where the policy now goes, not where it once went.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from anyview import config
+from anyview.learners.common.interfaces import Arrays
+from anyview.learners.common.noise import ornstein_uhlenbeck
+from anyview.learners.common.policies import with_time_bumps
+from anyview.learners.common.replay import Replay
+from anyview.learners.common.stacked import Adam, StackedMLP
+from anyview.seeds import stream
+
+
+class DDPG:
+    """R learners in lockstep; see ``interfaces.Learner``. An observation's last entry is time in [-1, 1].
+
+    ``runs`` are the runs' indices: row r draws from the streams of ``runs[r]`` alone. ``copies`` episodes of
+    ``horizon`` steps are acted in each of ``iterations`` iterations; noise anneals over these.
+    """
+
+    def __init__(
+        self,
+        params: config.DDPG,
+        seed: int,
+        runs: Sequence[int],
+        observation_size: int,
+        action_size: int,
+        horizon: int,
+        copies: int,
+        iterations: int,
+        device: torch.device,
+    ):
+        self._params, self._seed, self._runs = params, seed, list(runs)
+        self._action_size, self._horizon, self._copies = action_size, horizon, copies
+        self._iterations, self._device = iterations, device
+        inputs = observation_size + params.time_bumps
+        weights = [stream(seed, "policy", run) for run in self._runs]
+        self._policy = StackedMLP.initial([inputs, *params.hidden, action_size], weights, device)
+        self._critic = StackedMLP.initial([inputs + action_size, *params.hidden, 1], weights, device)
+        self._target_policy, self._target_critic = self._policy.copy(), self._critic.copy()
+        self._policy_adam, self._critic_adam = Adam(self._policy), Adam(self._critic)
+        # A row of the replay: observation, action, n-step return, observation n steps on, and its discount.
+        self._widths = [observation_size, action_size, 1, observation_size, 1]
+        self._replay = Replay(len(self._runs), params.replay, sum(self._widths), device)
+        self._iteration = 0
+        self._begin()
+
+    def _begin(self) -> None:
+        """Draw the noise (T, R, C, A) of the next episodes."""
+        params, shape = self._params, (self._copies, self._action_size)
+        progress = self._iteration / self._iterations
+        scale = params.noise * (params.noise_end / params.noise) ** progress
+        rngs = [stream(self._seed, "exploration", run, self._iteration) for run in self._runs]
+        paths = [ornstein_uhlenbeck(rng, self._horizon, shape, params.noise_theta) for rng in rngs]
+        self._noise = scale * np.stack(paths, axis=1)
+        self._episode: list[tuple[Tensor, ...]] = []
+
+    def _tensor(self, array: np.ndarray) -> Tensor:
+        return torch.from_numpy(np.asarray(array, np.float32)).to(self._device)
+
+    def _input(self, observations: Tensor) -> Tensor:
+        return with_time_bumps(observations, self._params.time_bumps)
+
+    @torch.no_grad()
+    def act(self, observations: np.ndarray, explore: bool) -> np.ndarray:
+        """Actions (R, C, A); with the annealed noise where ``explore``."""
+        actions = torch.tanh(self._policy(self._input(self._tensor(observations)))).cpu().numpy()
+        if explore:
+            actions = np.clip(actions + self._noise[len(self._episode)], -1, 1)
+        return actions.astype(np.float32)
+
+    def record(
+        self,
+        observations: np.ndarray,
+        actions: np.ndarray,
+        rewards: np.ndarray,
+        next_observations: np.ndarray,
+        step: int,
+    ) -> None:
+        """Keep a transition of the current episodes."""
+        if step != len(self._episode) + 1:
+            raise ValueError(f"step {step} recorded after {len(self._episode)} steps")
+        transition = (observations, actions, rewards, next_observations)
+        self._episode.append(tuple(map(self._tensor, transition)))
+
+    def end_iteration(self) -> None:
+        """Store the episodes; then take the iteration's updates."""
+        params = self._params
+        self._replay.add(self._transitions())
+        self._iteration += 1
+        if self._iteration * self._copies >= params.warmup_episodes:
+            updates = round(params.updates_per_step * self._horizon * self._copies)
+            for ages in self._sample(updates):
+                self._update(self._replay.take(ages))
+        self._begin()
+
+    def _transitions(self) -> Tensor:
+        """The episodes as rows of the replay (R, C T, W), one episode after the other.
+
+        The return at step t sums discount^k r_(t+k) over n steps or to the end of the episode, which has
+        nothing after it.
+        """
+        n, discount, horizon = self._params.n_step, self._params.discount, self._horizon
+        observations, actions, rewards, following = (
+            torch.stack(each) for each in zip(*self._episode, strict=True)
+        )
+        returns = torch.zeros_like(rewards)
+        ends = torch.arange(horizon, device=self._device).add(n).clamp(max=horizon)  # steps taken by then
+        for k in range(n):
+            returns[: horizon - k] += discount**k * rewards[k:]
+        beyond = torch.where(ends < horizon, discount**n, 0.0)[:, None, None, None].expand(*rewards.shape, 1)
+        rows = torch.cat([observations, actions, returns[..., None], following[ends - 1], beyond], dim=-1)
+        return rows.permute(1, 2, 0, 3).flatten(1, 2)
+
+    def _sample(self, updates: int) -> Tensor:
+        """Ages (updates, R, B) of transitions: half of a batch from the newest episodes, half from all."""
+        params, size = self._params, self._replay.size
+        newest = min(size, params.recent_episodes * self._horizon)
+        half = params.batch_size // 2
+        drawn = []
+        for run in self._runs:
+            rng = stream(self._seed, "replay", run, self._iteration)
+            late = rng.integers(newest, size=(updates, half))
+            drawn.append(np.hstack([late, rng.integers(size, size=(updates, params.batch_size - half))]))
+        return torch.from_numpy(np.stack(drawn, axis=1)).to(self._device)
+
+    def _update(self, batch: Tensor) -> None:
+        """One step of critic and policy on ``batch`` (R, B, W). Losses are means over B, sums over runs."""
+        params = self._params
+        observations, actions, returns, following, beyond = batch.split(self._widths, dim=-1)
+        inputs, following = self._input(observations), self._input(following)
+        with torch.no_grad():
+            next_actions = torch.tanh(self._target_policy(following))
+            targets = returns + beyond * self._target_critic(torch.cat([following, next_actions], dim=-1))
+        values = self._critic(torch.cat([inputs, actions], dim=-1))
+        self._critic_adam.descend(((values - targets) ** 2).mean(1).sum(), params.critic_learning_rate)
+        before_tanh = self._policy(inputs)
+        chosen = torch.cat([inputs, torch.tanh(before_tanh)], dim=-1)
+        cost = params.preactivation_penalty * (before_tanh**2).sum(-1, keepdim=True) - self._critic(chosen)
+        self._policy_adam.descend(cost.mean(1).sum(), params.policy_learning_rate)
+        self._target_critic.flat.lerp_(self._critic.flat, params.target_rate)
+        self._target_policy.flat.lerp_(self._policy.flat, params.target_rate)
+
+    def policy(self) -> Arrays:
+        """``weight<i>`` (R, in, out) and ``bias<i>`` (R, out): ReLU between layers, tanh at the end."""
+        arrays: Arrays = {}
+        for index, (weight, bias) in enumerate(self._policy.layers):
+            arrays[f"weight{index}"] = weight.detach().cpu().numpy().copy()
+            arrays[f"bias{index}"] = bias.detach()[:, 0].cpu().numpy().copy()
+        return arrays
+
+    def state(self) -> Arrays:
+        """Between iterations: weights, moments, replay. Noise and batches are drawn anew each iteration."""
+        tensors = {name: tensor.detach().cpu().numpy() for name, tensor in self._tensors().items()}
+        counts = [self._iteration, self._replay.written, self._policy_adam.steps, self._critic_adam.steps]
+        return tensors | {"replay": self._replay.contents().cpu().numpy(), "counts": np.array(counts)}
+
+    def restore(self, state: Arrays) -> None:
+        """Continue from ``state()`` bit for bit."""
+        for name, tensor in self._tensors().items():
+            tensor.copy_(torch.from_numpy(state[name]))
+        self._iteration, written, self._policy_adam.steps, self._critic_adam.steps = map(int, state["counts"])
+        self._replay.restore(torch.from_numpy(state["replay"]).to(self._device), written)
+        self._begin()
+
+    def _tensors(self) -> dict[str, Tensor]:
+        return {
+            "policy": self._policy.flat,
+            "critic": self._critic.flat,
+            "target_policy": self._target_policy.flat,
+            "target_critic": self._target_critic.flat,
+            "policy_mean": self._policy_adam.mean,
+            "policy_square": self._policy_adam.square,
+            "critic_mean": self._critic_adam.mean,
+            "critic_square": self._critic_adam.square,
+        }

@@ -1,0 +1,116 @@
+"""N pushers side by side on ``mujoco.batch``: physics, observations and frames of many contexts at once."""
+
+from collections.abc import Sequence
+
+import mujoco
+import mujoco.batch
+import numpy as np
+
+from anyview.pusher.contexts import Context
+from anyview.pusher.kinematics import joint_velocity, tool_pose, within_workspace
+from anyview.pusher.path import ACTIONS, FRAMES
+from anyview.pusher.render import renderer
+from anyview.pusher.scene import (
+    ARENA_CENTRE,
+    ARENA_RADIUS,
+    CONTROL_SECONDS,
+    JOINT_RANGE,
+    MAX_JOINT_SPEED,
+    MAX_TORQUE,
+    SUBSTEPS,
+    model,
+)
+
+ACTION_SIZE = 3
+OBSERVATION_SIZE = 15
+OBSERVATION_LIMIT = 3.0  # entries are clipped to this; a normal episode stays within about 1
+TOLERANCE = 0.02  # metres from object to goal in the last frame: success
+MAX_TWIST = np.array([0.9, 0.9, 3.0])  # m/s, m/s, rad/s at action 1
+
+__all__ = [
+    "ACTIONS",
+    "ACTION_SIZE",
+    "FRAMES",
+    "MAX_TWIST",
+    "OBSERVATION_LIMIT",
+    "OBSERVATION_SIZE",
+    "TOLERANCE",
+    "PusherBatch",
+]
+
+
+class PusherBatch:
+    """``len(contexts)`` pushers. An episode is a reset and ``ACTIONS`` steps, the same for all of them."""
+
+    def __init__(self, contexts: Sequence[Context], control: str = "twist", image_size: int = 64):
+        self.contexts = list(contexts)
+        self.count = len(self.contexts)
+        self.steps = 0
+        self._control = control
+        self._image_size = image_size
+        self._start = np.array([[*c.arm_qpos, *c.object_xy] for c in self.contexts])
+        self._goal = np.array([c.goal_xy for c in self.contexts])
+        self._batch = mujoco.batch.Batch(model(control), nsim=self.count, nthread=1)
+        self._qpos, self._qvel, self._ctrl = (self._batch.bind(name) for name in ("qpos", "qvel", "ctrl"))
+
+    def reset(self) -> np.ndarray:
+        """Put every pusher at its context's start; observations (N, OBSERVATION_SIZE)."""
+        self._batch.reset()
+        self._qpos[:] = self._start
+        self._qvel[:] = 0
+        self.steps = 0
+        return self.observations()
+
+    def step(self, actions: np.ndarray) -> np.ndarray:
+        """Act for 0.1 s with ``actions`` (N, 3) in [-1, 1]; observations (N, OBSERVATION_SIZE) float32."""
+        actions = np.clip(np.asarray(actions, np.float64), -1, 1)
+        if self._control == "torque":
+            self._ctrl[:] = actions * MAX_TORQUE
+        else:
+            twist = actions * MAX_TWIST
+            tool = tool_pose(self._qpos[:, :3])[:, :2]
+            target = within_workspace(tool + CONTROL_SECONDS * twist[:, :2])
+            twist[:, :2] = (target - tool) / CONTROL_SECONDS
+            speed = joint_velocity(self._qpos[:, :3], twist)
+            # Slow all joints alike, so that the tool keeps its direction.
+            excess = np.abs(speed).max(-1, keepdims=True) / MAX_JOINT_SPEED
+            self._ctrl[:] = speed / np.maximum(excess, 1)
+        self._batch.step(nstep=SUBSTEPS)
+        self.steps += 1
+        return self.observations()
+
+    def observations(self) -> np.ndarray:
+        """(N, OBSERVATION_SIZE) float32, each entry about in [-1, 1].
+
+        Joint angles (3) and speeds (3), tool position (2) and heading as sine and cosine (2), object (2) and
+        goal (2), time (1).
+        """
+        joints = self._qpos[:, :3]
+        tool = tool_pose(joints)
+        parts = [
+            joints / JOINT_RANGE,
+            self._qvel[:, :3] / MAX_JOINT_SPEED,
+            _in_arena(tool[:, :2]),
+            np.sin(tool[:, 2:]),
+            np.cos(tool[:, 2:]),
+            _in_arena(self._qpos[:, 3:]),
+            _in_arena(self._goal),
+            np.full((self.count, 1), 2 * self.steps / ACTIONS - 1),
+        ]
+        return np.concatenate(parts, axis=-1).clip(-OBSERVATION_LIMIT, OBSERVATION_LIMIT).astype(np.float32)
+
+    def positions(self) -> np.ndarray:
+        """Joint angles and object position (N, 5), as ``render`` takes them."""
+        return self._qpos.copy()
+
+    def distance(self) -> np.ndarray:
+        """Metres (N,) from the object's centre to the goal's."""
+        return np.linalg.norm(self._qpos[:, 3:] - self._goal, axis=-1)
+
+    def render(self) -> np.ndarray:
+        """What each context's camera sees: (N, H, W, 3) uint8 RGB."""
+        return renderer(self._image_size).render(self.contexts, self._qpos)
+
+
+def _in_arena(position: np.ndarray) -> np.ndarray:
+    return (position - ARENA_CENTRE) / ARENA_RADIUS

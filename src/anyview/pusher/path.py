@@ -1,0 +1,58 @@
+"""The expert's path: approach, push and rest, at the same steps in every demonstration.
+
+Clips are paired by time step, so that frame t means the same progress in each of them.
+"""
+
+import numpy as np
+
+from anyview.pusher.kinematics import heading, tool_pose, wrap
+from anyview.pusher.scene import CUP, FINGER_RADIUS, OBJECT_RADIUS, SEAT
+
+FRAMES = 50  # of an episode: o_0 after reset, then o_t after action t
+ACTIONS = FRAMES - 1
+APPROACH_END = 14  # step at which the cup stands behind the object
+PUSH_END = 42  # step at which the object lies on the goal; then the expert rests
+STANDOFF = 0.04  # metres between the cup's seat and the object before the push
+APPROACH_CLEARANCE = 0.02  # metres between cup and object during the approach
+
+
+def push_pose(object_xy: np.ndarray, goal_xy: np.ndarray) -> np.ndarray:
+    """Tool poses (..., 3) that stand behind the object, facing the goal."""
+    way = goal_xy - object_xy
+    direction = np.arctan2(way[..., 1], way[..., 0])
+    position = object_xy - (SEAT + STANDOFF) * heading(direction)
+    return np.concatenate([position, direction[..., None]], axis=-1)
+
+
+def minimum_jerk(progress: np.ndarray) -> np.ndarray:
+    """Smooth 0 to 1 with zero speed and acceleration at both ends (Flash and Hogan 1985)."""
+    s = np.clip(progress, 0, 1)
+    return s**3 * (10 - 15 * s + 6 * s**2)
+
+
+def expert_poses(arm_qpos: np.ndarray, object_xy: np.ndarray, goal_xy: np.ndarray) -> np.ndarray:
+    """Reference tool poses (P, 50, 3) for starts (P, 3), objects (P, 2) and goals (P, 2)."""
+    start = tool_pose(arm_qpos)
+    behind = push_pose(object_xy, goal_xy)
+    end = behind.copy()
+    end[:, :2] = goal_xy - SEAT * heading(behind[:, 2])
+    turn = behind - start
+    turn[:, 2] = wrap(turn[:, 2])
+    steps = np.arange(FRAMES)
+    approach = minimum_jerk(steps / APPROACH_END)[None, :, None]
+    push = minimum_jerk((steps - APPROACH_END) / (PUSH_END - APPROACH_END))[None, :, None]
+    return start[:, None] + approach * turn[:, None] + push * (end - behind)[:, None]
+
+
+def clearance(poses: np.ndarray, object_xy: np.ndarray) -> np.ndarray:
+    """Least distance (P,) in metres between cup and object during the approach of ``poses`` (P, T, 3)."""
+    approach = poses[:, : APPROACH_END + 1]
+    forward = heading(approach[..., 2])
+    left = np.stack([-forward[..., 1], forward[..., 0]], axis=-1)
+    relative = object_xy[:, None] - approach[..., :2]
+    seen = np.stack([(relative * forward).sum(-1), (relative * left).sum(-1)], axis=-1)  # in the tool's frame
+    distance = np.full(seen.shape[:2], np.inf)
+    for a, b in CUP:
+        along = np.clip(((seen - a) @ (b - a)) / ((b - a) @ (b - a)), 0, 1)
+        distance = np.minimum(distance, np.linalg.norm(seen - a - along[..., None] * (b - a), axis=-1))
+    return distance.min(-1) - FINGER_RADIUS - OBJECT_RADIUS

@@ -1,0 +1,1 @@
+"""Rewards that compare what an agent sees with a demonstration."""

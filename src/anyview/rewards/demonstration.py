@@ -1,0 +1,121 @@
+"""Rewards that compare what an agent's camera sees with a demonstration in its own view (equations 20 to 22).
+
+L_f(o_t) = -|Enc1(o_t) - mean_i T(Enc1(o_t^i), Enc2(o_0^a))|^2 over features, and
+L_i(o_t) = -|o_t - mean_i G(o_t^i, o_0^a)|^2 over pixels and colours in [-1, 1], for t = 1..T; the means are
+over the m demonstrations i, and o_0^a is the first frame of the agent a.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from anyview import config
+from anyview.learners.common.interfaces import Arrays
+from anyview.translator.network import ContextTranslator, to_frames, to_input
+
+_BATCH = 64
+
+
+class DemonstrationReward:
+    """-(t/T)^p (L_f/u_f + phi L_i/u_i)/(1 + phi): see ``interfaces.RewardSource``. Nothing is learned.
+
+    u_f and u_i are a run's own means over t of (t/T)^p |..|^2 for a camera that keeps seeing o_0: the cost of
+    standing still. So standing still earns -1 a step in every context and with every translator, one learning
+    rate serves them all, and phi has no unit. A term that is switched off is left out of sum and norm.
+
+    ``units`` (R,) brings a reward back to the equations' scale, where L_f has weight 1: reward * units =
+    L_f + phi (u_f/u_i) L_i, or L_i where L_f is off.
+    """
+
+    def __init__(
+        self,
+        model: ContextTranslator,
+        features: Tensor,
+        images: Tensor,
+        first_frames: np.ndarray,
+        params: config.Reward,
+        feature: bool = True,
+        image: bool = True,
+    ):
+        """Targets ``features`` (R, T, Z), ``images`` (R, T, 3, H, W); uint8 ``first_frames`` (R, H, W, 3)."""
+        device = features.device
+        self._model, self._features, self._images = model, features, images
+        self._first = first_frames
+        steps = features.shape[1]
+        self._weights = (torch.arange(1, steps + 1, device=device) / steps) ** params.time_power
+        first = to_input(torch.from_numpy(first_frames).to(device))
+        with torch.inference_mode():
+            still_features = ((model.encode_expert(first)[:, None] - features) ** 2).sum(-1)
+            still_images = ((first[:, None] - images) ** 2).sum((2, 3, 4))
+        feature_unit = (self._weights * still_features).mean(1).clamp_min(1e-6)
+        image_unit = (self._weights * still_images).mean(1).clamp_min(1e-6)
+        phi = params.phi if image else 0.0
+        norm = phi + (1.0 if feature else 0.0)
+        self._feature_scale = (1.0 / norm if feature else 0.0) / feature_unit[:, None]
+        self._image_scale = (phi / norm) / image_unit[:, None]
+        self.units = (feature_unit * norm if feature else image_unit).cpu().numpy()
+
+    @torch.inference_mode()
+    def step(self, frames: np.ndarray, step: int) -> np.ndarray:
+        """Rewards (R, C) of uint8 ``frames`` (R, C, H, W, 3) seen after action ``step`` (1 to T)."""
+        seen = to_input(torch.from_numpy(frames).to(self._features.device))
+        reward = torch.zeros(seen.shape[:2], device=seen.device)
+        if self._feature_scale.any():
+            features = self._model.encode_expert(seen.flatten(0, 1)).unflatten(0, seen.shape[:2])
+            reward -= self._feature_scale * ((features - self._features[:, None, step - 1]) ** 2).sum(-1)
+        if self._image_scale.any():
+            away = (seen - self._images[:, None, step - 1]).flatten(2)
+            reward -= self._image_scale * (away**2).sum(-1)
+        return (self._weights[step - 1] * reward).cpu().numpy()
+
+    def targets(self) -> np.ndarray:
+        """The demonstration each run imitates, from o_0 on in its own view: uint8 (R, T + 1, H, W, 3)."""
+        return np.concatenate([self._first[:, None], to_frames(self._images)], axis=1)
+
+    def end_iteration(self) -> Arrays:
+        """Nothing to learn or log."""
+        return {}
+
+    def state(self) -> Arrays:
+        """Nothing beyond what it is made from."""
+        return {}
+
+    def restore(self, state: Arrays) -> None:
+        """Nothing to restore."""
+
+
+@torch.inference_mode()
+def translate_demonstrations(
+    model: ContextTranslator, demonstrations: np.ndarray, first_frames: np.ndarray
+) -> tuple[Tensor, Tensor]:
+    """Mean translated features (R, T, Z) and frames (R, T, 3, H, W) for each agent's first frame.
+
+    ``demonstrations`` (m, T + 1, H, W, 3) and ``first_frames`` (R, H, W, 3) are uint8.
+    """
+    device = next(model.parameters()).device
+    clips = [_encode(model, clip[1:], device) for clip in demonstrations]
+    features, images = [], []
+    for frame in first_frames:
+        z2, skips = model.encode_context(to_input(torch.from_numpy(frame[None]).to(device)))
+        translated = [model.translate(z1, z2.expand(len(z1), -1)) for z1 in clips]
+        features.append(torch.stack(translated).mean(0))
+        images.append(torch.stack([model.decode(z3, skips) for z3 in translated]).mean(0))
+    return torch.stack(features), torch.stack(images)
+
+
+@torch.inference_mode()
+def true_demonstrations(model: ContextTranslator, clips: np.ndarray) -> tuple[Tensor, Tensor]:
+    """The Oracle's targets: Enc1(o_t) and o_t of ``clips`` (R, T + 1, H, W, 3), each in its agent's view."""
+    device = next(model.parameters()).device
+    features = torch.stack([_encode(model, clip[1:], device) for clip in clips])
+    return features, to_input(torch.from_numpy(clips[:, 1:]).to(device))
+
+
+def _encode(
+    model: ContextTranslator, frames: Sequence[np.ndarray] | np.ndarray, device: torch.device
+) -> Tensor:
+    """Enc1 (N, Z) of uint8 frames (N, H, W, 3), a bounded batch at a time."""
+    pixels = torch.from_numpy(np.ascontiguousarray(frames)).to(device)
+    return torch.cat([model.encode_expert(to_input(part)) for part in pixels.split(_BATCH)])

@@ -1,0 +1,56 @@
+"""The `tcn` baseline's reward: how near an agent's frame is to the demonstrations', in an embedding."""
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from anyview import config
+from anyview.embedding.embedding import Embedding
+from anyview.learners.common.interfaces import Arrays
+from anyview.translator.network import to_input
+
+
+class EmbeddingReward:
+    """-(t/T)^p |e(o_t) - mean_i e(o_t^i)|^2 / u over demonstrations i; see ``interfaces.RewardSource``.
+
+    By a constant of t it is the mean of -|e(o_t) - e(o_t^i)|^2. As in ``rewards.DemonstrationReward``, u is a
+    run's mean over t for a camera that keeps seeing o_0: standing still earns -1 a step. ``units`` are these
+    u (R,): reward * units is in the embedding's own scale. Nothing is learned.
+    """
+
+    def __init__(
+        self, model: Embedding, demonstrations: np.ndarray, first_frames: np.ndarray, params: config.Reward
+    ):
+        """uint8 ``demonstrations`` (m, T + 1, H, W, 3) in any views, ``first_frames`` (R, H, W, 3)."""
+        self._model = model
+        self._device = next(model.parameters()).device
+        self._targets = torch.stack([self._embed(clip[1:]) for clip in demonstrations]).mean(0)  # (T, D)
+        steps = len(self._targets)
+        self._weights = (torch.arange(1, steps + 1, device=self._device) / steps) ** params.time_power
+        still = ((self._embed(first_frames)[:, None] - self._targets) ** 2).sum(-1)
+        self._units = (self._weights * still).mean(1).clamp_min(1e-6)
+        self.units = self._units.cpu().numpy()
+
+    @torch.inference_mode()
+    def _embed(self, frames: np.ndarray) -> Tensor:
+        """Embeddings (N, D) of uint8 ``frames`` (N, H, W, 3)."""
+        return self._model(to_input(torch.from_numpy(np.ascontiguousarray(frames)).to(self._device)))
+
+    @torch.inference_mode()
+    def step(self, frames: np.ndarray, step: int) -> np.ndarray:
+        """Rewards (R, C) of uint8 ``frames`` (R, C, H, W, 3) seen after action ``step`` (1 to T)."""
+        runs, copies = frames.shape[:2]
+        seen = self._embed(frames.reshape(runs * copies, *frames.shape[2:])).unflatten(0, (runs, copies))
+        away = ((seen - self._targets[step - 1]) ** 2).sum(-1)
+        return (-self._weights[step - 1] * away / self._units[:, None]).cpu().numpy()
+
+    def end_iteration(self) -> Arrays:
+        """Nothing to learn or log."""
+        return {}
+
+    def state(self) -> Arrays:
+        """Nothing beyond what it is made from."""
+        return {}
+
+    def restore(self, state: Arrays) -> None:
+        """Nothing to restore."""

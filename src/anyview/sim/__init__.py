@@ -1,5 +1,0 @@
-"""The planar pusher: scene, contexts, camera, environments and the scripted expert."""
-
-from anyview.runtime.graphics import load_mujoco
-
-load_mujoco()  # before any module here imports mujoco, so that it finds a headless OpenGL

@@ -1,0 +1,1 @@
+"""How networks are trained: batches, optimisation, the loop with its checkpoints."""

@@ -1,1 +1,0 @@
-"""The context translator: network, losses, training, evaluation, feature weights."""

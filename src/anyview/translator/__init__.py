@@ -1,0 +1,1 @@
+"""The context translator: network, losses, weights on disk."""

@@ -1,0 +1,94 @@
+"""The translator's losses, on the thesis's scale.
+
+Its loss values fit L_tr and L_rec as half the sum of squares over a batch of 100 frames, and L_align as 1,000
+times the mean (inferred: the thesis does not say). So the scale stays the same for any batch size here.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from torch import Generator, Tensor
+from torch.nn import functional as F
+
+from anyview.config import LossWeights
+from anyview.translator.network import ContextTranslator
+
+FRAME_SCALE = 100 / 2
+ALIGNMENT_SCALE = 1000
+
+NAMES = ("translation", "reconstruction", "alignment")
+
+
+@dataclass(frozen=True)
+class Losses:
+    """L_tr, L_rec and L_align of a batch, scalars; None where a loss was left out."""
+
+    translation: Tensor | None
+    reconstruction: Tensor | None
+    alignment: Tensor | None
+
+    def total(self, weights: LossWeights) -> Tensor:
+        """L = w_tr L_tr + w_rec L_rec + w_align L_align of the losses that are there."""
+        parts = [getattr(weights, name) * loss for name in NAMES if (loss := getattr(self, name)) is not None]
+        return sum(parts[1:], parts[0])
+
+    def parts(self) -> list[Tensor]:
+        """The three losses without gradients, NaN where one was left out."""
+        present = [getattr(self, name) for name in NAMES]
+        like = next(loss for loss in present if loss is not None)
+        return [torch.full_like(like, torch.nan) if loss is None else loss.detach() for loss in present]
+
+
+def frame_loss(output: Tensor, target: Tensor) -> Tensor:
+    """50 |output - target|^2, mean over the batch; both (N, 3, H, W) in [-1, 1]."""
+    return torch.as_tensor(_SquaredError.apply(output, target)) * (FRAME_SCALE / len(target))
+
+
+class _SquaredError(torch.autograd.Function):
+    """The sum of squares of output - target; backward scales the difference that forward left.
+
+    PyTorch's own subtracts twice and fills a gradient of the pictures' size with zeros first.
+    """
+
+    @staticmethod
+    def forward(ctx: Any, output: Tensor, target: Tensor) -> Tensor:
+        ctx.difference, ctx.dtype = output.to(torch.float32, copy=True).sub_(target), output.dtype
+        return ctx.difference.square().sum()
+
+    @staticmethod
+    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None]:
+        return ctx.difference.mul_(2 * gradient).to(ctx.dtype), None
+
+
+def alignment_loss(z3: Tensor, z_true: Tensor) -> Tensor:
+    """1,000 times the mean square of z3 - Enc1(o_t^j); both (N, width)."""
+    return F.mse_loss(z3.float(), z_true.float()) * ALIGNMENT_SCALE
+
+
+def batch_losses(
+    model: ContextTranslator,
+    paired: Tensor,
+    context: Tensor,
+    wanted: LossWeights | None = None,
+    noise: Generator | None = None,
+) -> Losses:
+    """Losses of ``paired`` (2N, 3, H, W), o_t^i and after them o_t^j, and ``context`` o_0^j (N, 3, H, W).
+
+    Frames are in [-1, 1]. With ``wanted`` only the losses whose weight is above 0 are computed; ``noise``
+    turns dropout on. Both decodings share what the decoder makes of the skips.
+    """
+    target = paired[len(context) :]
+    z1, z_true = model.encode_expert(paired, noise).chunk(2)
+    z2, skips = model.encode_context(context, noise)
+    z3 = model.translate(z1, z2, noise)
+    shares = model.decoder.shares(skips)
+
+    def decoding_loss(z: Tensor) -> Tensor:
+        return frame_loss(model.decoder(z, shares, noise), target)
+
+    return Losses(
+        decoding_loss(z3) if wanted is None or wanted.translation else None,
+        decoding_loss(z_true) if wanted is None or wanted.reconstruction else None,
+        alignment_loss(z3, z_true) if wanted is None or wanted.alignment else None,
+    )

@@ -1,0 +1,67 @@
+"""Batched physics against MuJoCo stepped one simulation at a time, and the expert in it."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from anyview.pusher.batch import MAX_TWIST, TOLERANCE, PusherBatch
+from anyview.pusher.contexts import sample_contexts
+from anyview.pusher.expert import roll_out
+from anyview.pusher.scene import model
+
+CONTEXTS, _ = sample_contexts(np.random.default_rng(11), 5)
+
+
+@pytest.mark.parametrize("control", ["twist", "torque"])
+def test_batch_equals_single_simulations(control: str) -> None:
+    actions = np.random.default_rng(0).uniform(-1, 1, (30, len(CONTEXTS), 3))
+    batch = PusherBatch(CONTEXTS, control)
+    batch.reset()
+    together = np.stack([(batch.step(a), batch.positions())[1] for a in actions])
+    for index, context in enumerate(CONTEXTS):
+        alone = PusherBatch([context], control)
+        alone.reset()
+        single = np.stack([(alone.step(a[index : index + 1]), alone.positions())[1] for a in actions])
+        np.testing.assert_array_equal(together[:, index], single[:, 0])
+
+
+def test_torque_steps_equal_mj_step() -> None:
+    context = CONTEXTS[0]
+    batch = PusherBatch([context], "torque")
+    batch.reset()
+    scene = model("torque")
+    data = mujoco.MjData(scene)
+    data.qpos[:] = [*context.arm_qpos, *context.object_xy]
+    for action in np.random.default_rng(1).uniform(-1, 1, (20, 3)):
+        batch.step(action[None])
+        data.ctrl[:] = 3.0 * action
+        mujoco.mj_step(scene, data, 10)
+        np.testing.assert_array_equal(batch.positions()[0], data.qpos)
+
+
+def test_a_twist_moves_the_tool_at_its_speed() -> None:
+    batch = PusherBatch(CONTEXTS)
+    before = batch.reset()
+    batch.step(np.tile([0.3, -0.2, 0.1], (len(CONTEXTS), 1)))
+    after = batch.step(np.tile([0.3, -0.2, 0.1], (len(CONTEXTS), 1)))
+    moved = (after - before)[:, 6:8] * 0.5  # tool position, in units of the arena's radius
+    np.testing.assert_allclose(moved, np.tile(MAX_TWIST[:2] * [0.3, -0.2] * 0.2, (5, 1)), atol=0.012)
+
+
+def test_observations_stay_in_their_bounds_under_wild_actions() -> None:
+    batch = PusherBatch(CONTEXTS, "torque")
+    batch.reset()
+    for _ in range(49):
+        observations = batch.step(np.full((len(CONTEXTS), 3), 1.0))
+        assert np.isfinite(observations).all()
+        assert np.abs(observations).max() <= 3
+
+
+def test_expert_succeeds_in_unseen_contexts_on_one_time_profile() -> None:
+    contexts, _ = sample_contexts(np.random.default_rng(987654321), 1000)
+    positions, distances = roll_out(contexts)
+    assert (distances < TOLERANCE).mean() >= 0.99
+    speed = np.linalg.norm(np.diff(positions[:, :, 3:], axis=1), axis=-1)
+    assert speed[:, :13].max() < 1e-6  # nobody touches the object before the push
+    assert (speed[:, 22:38].min(axis=1) > 0.004).all()  # everybody pushes at the same steps
+    assert speed[:, 44:].max() < 1e-3  # and rests at the same steps

@@ -1,0 +1,91 @@
+"""The reward against a slow, literal evaluation of equations 20 to 22."""
+
+import numpy as np
+import pytest
+import torch
+
+from anyview import config
+from anyview.rewards.demonstration import DemonstrationReward, translate_demonstrations, true_demonstrations
+from anyview.translator.network import ContextTranslator, to_input
+
+
+def literal(
+    model: ContextTranslator, demonstrations: np.ndarray, first: np.ndarray, frame: np.ndarray, t: int
+) -> tuple[float, float]:
+    """L_f and L_i of one ``frame`` at ``t``, one demonstration and one network call at a time."""
+    z2, skips = model.encode_context(to_input(first[None]))
+    features, images = [], []
+    for clip in demonstrations:
+        z3 = model.translate(model.encode_expert(to_input(clip[t][None])), z2)
+        features.append(z3[0].numpy().astype(np.float64))
+        images.append(model.decode(z3, skips)[0].numpy().astype(np.float64))
+    z = model.encode_expert(to_input(frame[None]))[0].numpy().astype(np.float64)
+    pixels = frame.transpose(2, 0, 1).astype(np.float64) / 127.5 - 1
+    feature, image = sum(features) / len(features), sum(images) / len(images)
+    return -((z - feature) ** 2).sum(), -((pixels - image) ** 2).sum()
+
+
+@pytest.mark.parametrize(
+    ("feature", "image", "power"),
+    [(True, True, 0.0), (True, True, 2.0), (True, False, 0.0), (False, True, 1.0)],
+)
+def test_reward_is_the_equations(translator, expert_clips, feature: bool, image: bool, power: float) -> None:
+    demonstrations, first = expert_clips[:3], expert_clips[3:, 0]
+    params = config.Reward(phi=0.3, time_power=power, demonstrations=3)
+    targets = translate_demonstrations(translator, demonstrations, first)
+    reward = DemonstrationReward(translator, *targets, first, params, feature, image)
+    # Standing still, term by term: the units.
+    still = np.zeros((2, 2))
+    for run in range(2):
+        for t in range(1, 50):
+            still[run] -= np.multiply(
+                (t / 49) ** power, literal(translator, demonstrations, first[run], first[run], t)
+            )
+    still /= 49
+    for t in (1, 30, 49):
+        frames = np.stack([expert_clips[3:, t], expert_clips[3:, 49 - t]], axis=1)  # (R, C, ...)
+        got = reward.step(frames, t)
+        for run in range(2):
+            for copy in range(2):
+                l_f, l_i = literal(translator, demonstrations, first[run], frames[run, copy], t)
+                phi = 0.3 if image else 0.0
+                terms = (l_f / still[run, 0] if feature else 0.0) + phi * l_i / still[run, 1]
+                expected = (t / 49) ** power * terms / ((1.0 if feature else 0.0) + phi)
+                np.testing.assert_allclose(got[run, copy], expected, rtol=1e-4)
+                # In the equations' own units: L_f + phi' L_i, or L_i alone.
+                ratio = phi * still[run, 0] / still[run, 1]
+                plain = l_f + ratio * l_i if feature else l_i
+                np.testing.assert_allclose(
+                    got[run, copy] * reward.units[run], (t / 49) ** power * plain, rtol=1e-4
+                )
+
+
+def test_standing_still_earns_minus_one_a_step(translator, expert_clips) -> None:
+    first = expert_clips[:, 0]
+    params = config.Reward(phi=0.7, time_power=1.0, demonstrations=3)
+    for targets in (
+        translate_demonstrations(translator, expert_clips[:3], first),
+        true_demonstrations(translator, expert_clips),
+    ):
+        reward = DemonstrationReward(translator, *targets, first, params)
+        returns = sum(reward.step(first[:, None], t) for t in range(1, 50))
+        np.testing.assert_allclose(returns, -49, rtol=1e-4)
+
+
+def test_the_oracle_s_optimum_is_the_experts_own_motion(translator, expert_clips) -> None:
+    targets = true_demonstrations(translator, expert_clips)
+    params = config.Reward(phi=0.3, time_power=0.0, demonstrations=3)
+    reward = DemonstrationReward(translator, *targets, expert_clips[:, 0], params)
+    np.testing.assert_array_equal(reward.targets(), expert_clips)
+    for t in (1, 25, 49):
+        same = reward.step(expert_clips[:, None, t], t)
+        other = reward.step(expert_clips[:, None, t - 20], t)
+        np.testing.assert_allclose(same, 0, atol=1e-6)
+        assert (other < same - 1e-3).all()
+
+
+def test_batches_do_not_change_a_translation(translator, expert_clips) -> None:
+    alone = translate_demonstrations(translator, expert_clips[:2], expert_clips[3:4, 0])
+    together = translate_demonstrations(translator, expert_clips[:2], expert_clips[2:5, 0])
+    for one, many in zip(alone, together, strict=True):
+        torch.testing.assert_close(one[0], many[1], atol=1e-5, rtol=1e-5)
