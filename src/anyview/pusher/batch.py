@@ -20,6 +20,7 @@ from anyview.pusher.scene import (
     SUBSTEPS,
     model,
 )
+from anyview.trigonometry import unit_vector
 
 ACTION_SIZE = 3
 OBSERVATION_SIZE = 15
@@ -91,8 +92,7 @@ class PusherBatch:
             joints / JOINT_RANGE,
             self._qvel[:, :3] / MAX_JOINT_SPEED,
             _in_arena(tool[:, :2]),
-            np.sin(tool[:, 2:]),
-            np.cos(tool[:, 2:]),
+            unit_vector(tool[:, 2])[:, ::-1],
             _in_arena(self._qpos[:, 3:]),
             _in_arena(self._goal),
             np.full((self.count, 1), 2 * self.steps / ACTIONS - 1),
