@@ -1,8 +1,8 @@
 """Unit vectors from angles and angles from vectors, with the same last bit on every processor.
 
-numpy has kernels of its own for the sine, cosine and arc tangent of real numbers. Which one runs depends on the
-processor (AVX-512 has another than AVX2), and their last bits differ. Of complex numbers it lets the C library
-compute, whose results are the same on every processor with AVX2.
+For real numbers, numpy's sine, cosine and arc tangent depend on the processor: with AVX-512 they are its own
+and differ from the C library's in the last bit. For complex numbers numpy always calls the C library, whose
+results are the same on every processor with AVX2.
 """
 
 import numpy as np

@@ -3,9 +3,9 @@
 The geometry asks that the expert's straight push, from behind the object to the goal, and its approach are
 within the arm's reach and workspace and clear of the object. The expert is never run to choose contexts.
 
-Every number of a context is rounded to ``_DECIMALS`` decimals before anything depends on it. So contexts are the
-same even where a library computes another last bit, but for a value within its last bit of a rounding's or a
-test's edge: less than one context in 10^8.
+Every number of a context is rounded to ``_DECIMALS`` decimals before anything depends on it. So contexts are
+the same even where a library computes another last bit. The exception is a value that lies within this bit of
+where rounding or a test decides: less than one context in 10^8.
 """
 
 import json
@@ -35,6 +35,7 @@ _DISTRACTOR_RADIUS = 0.62  # metres: as far from the arena's centre as the camer
 _DISTRACTOR_CLEARANCE = 0.2  # metres, from the middle of goal and object
 _DECIMALS = 6  # of metres, radians and colours
 _PROPOSALS = 4096
+_FARTHEST = 100.0  # metres or radians: MuJoCo gives up on huge numbers
 _START_DISTANCE = (0.1, 0.4)  # metres from the place behind the object
 _START_SIDE = np.deg2rad(110.0)
 _JOINT_STEP = 0.35  # radians from one frame to the next: no joint wraps round or races
@@ -58,6 +59,20 @@ class Context:
     goal_xy: tuple[float, float]
     arm_qpos: tuple[float, float, float]
     distractors: tuple[Distractor, ...]
+
+    def __post_init__(self) -> None:
+        """Raises ValueError if an angle or a place is none that physics can start from."""
+        for name, shape in (("azimuth", ()), ("object_xy", (2,)), ("goal_xy", (2,)), ("arm_qpos", (3,))):
+            values = getattr(self, name)
+            try:
+                usable = np.shape(values) == shape and (np.abs(values) < _FARTHEST).all()
+            except (TypeError, ValueError):
+                usable = False
+            if not usable:
+                wanted = f"{shape[0]} numbers" if shape else "a number"
+                raise ValueError(
+                    f"context: {name}: expected {wanted} of less than {_FARTHEST:g}, got {values!r}"
+                )
 
     def to_json(self) -> str:
         """One line of JSON; floats keep every bit."""
@@ -155,6 +170,7 @@ def _distractor(rng: np.random.Generator, object_xy: np.ndarray, goal_xy: np.nda
 
 
 def _in_disc(rng: np.random.Generator, radius: float, count: int) -> np.ndarray:
-    """Points (count, 2) uniform in the disc of ``radius`` around the arena's centre, which rounding never leaves."""
+    """Points (count, 2) uniform in the disc of ``radius`` around the arena's centre."""
+    # A little less, so that no point is rounded out of the disc.
     distance = (radius - 10.0**-_DECIMALS) * np.sqrt(rng.uniform(0, 1, (count, 1)))
     return (ARENA_CENTRE + distance * unit_vector(rng.uniform(-np.pi, np.pi, count))).round(_DECIMALS)

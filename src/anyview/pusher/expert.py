@@ -18,7 +18,8 @@ from anyview.pusher.scene import CONTROL_SECONDS
 def roll_out(contexts: Sequence[Context]) -> tuple[np.ndarray, np.ndarray]:
     """Run the expert in every context.
 
-    Returns positions (N, 50, 5) as ``Renderer`` takes them and final distances (N,) in metres, to a micrometre.
+    Returns positions (N, 50, 5) as ``Renderer`` takes them and final distances (N,) in metres, rounded to 6
+    decimals.
     """
     batch = PusherBatch(contexts)
     batch.reset()

@@ -2,9 +2,9 @@
 
 A tool pose is (x, y, heading) in metres and radians: the end of the third link and the way the cup points.
 
-Physics and demonstrations rest on this module, so its results have the same bits on every processor: no function
-here calls BLAS or LAPACK (``@``, ``np.dot``, ``np.linalg.solve``, the norm of a single vector), whose kernels sum
-in an order of their own on each processor.
+Physics and demonstrations rest on this module, and its results have the same bits on every processor. So
+nothing here calls BLAS or LAPACK (``@``, ``np.dot``, ``np.linalg.solve``, the norm of a single vector), which sum
+in another order on another processor.
 """
 
 import numpy as np
@@ -26,7 +26,7 @@ def tool_pose(joints: np.ndarray) -> np.ndarray:
 
 
 def jacobian(joints: np.ndarray) -> np.ndarray:
-    """d(tool position)/d(joints), (..., 2, 3) in metres a radian. The heading's row, all ones, is left out."""
+    """d(tool position)/d(joints), (..., 2, 3). The third row, of the heading, is all ones and left out."""
     links = LINK * unit_vector(np.cumsum(joints, axis=-1))  # (..., link, 2)
     outward = np.cumsum(links[..., ::-1, :], axis=-2)[..., ::-1, :]  # joint k moves the links from k outward
     return np.stack([-outward[..., 1], outward[..., 0]], axis=-2)
