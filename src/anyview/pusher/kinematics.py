@@ -3,8 +3,8 @@
 A tool pose is (x, y, heading) in metres and radians: the end of the third link and the way the cup points.
 
 Physics and demonstrations rest on this module, and its results have the same bits on every processor. So
-nothing here calls BLAS or LAPACK (``@``, ``np.dot``, ``np.linalg.solve``, the norm of a single vector), which sum
-in another order on another processor.
+nothing here calls BLAS or LAPACK (``@``, ``np.dot``, ``np.linalg.solve``, the norm of a single vector): they
+sum in another order on another processor.
 """
 
 import numpy as np
