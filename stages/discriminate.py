@@ -5,7 +5,9 @@ Usage: python stages/discriminate.py CELL
 
 from anyview.adversarial import gail, tpil
 from anyview.config import load_params
+from anyview.evaluation.methods import Method
 from anyview.evaluation.stage import evaluate_method
+from anyview.learners import trpo
 from anyview.runtime.errors import choose, run_stage
 
 REWARDS = {"gail": gail.make_reward, "tpil": tpil.make_reward}
@@ -16,7 +18,8 @@ def main(arguments: list[str]) -> None:
     params = load_params()
     cells = params.adversarial.cells
     name = choose(arguments, cells, "python stages/discriminate.py CELL")
-    evaluate_method(name, params, REWARDS[cells[name].reward], [])
+    method = Method(trpo.make_learner, REWARDS[cells[name].reward])
+    evaluate_method(name, params, method, sources=[])
 
 
 if __name__ == "__main__":

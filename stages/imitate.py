@@ -5,9 +5,13 @@ Usage: python stages/imitate.py CELL
 
 from anyview import paths
 from anyview.config import load_params
+from anyview.evaluation.methods import Method
 from anyview.evaluation.stage import evaluate_method
+from anyview.learners import ddpg, trpo
 from anyview.rewards.cells import make_reward
 from anyview.runtime.errors import choose, run_stage
+
+LEARNERS = {"ddpg": ddpg.make_learner, "trpo": trpo.make_learner}
 
 
 def main(arguments: list[str]) -> None:
@@ -15,7 +19,8 @@ def main(arguments: list[str]) -> None:
     params = load_params()
     cells = params.imitation.cells
     name = choose(arguments, cells, "python stages/imitate.py CELL")
-    evaluate_method(name, params, make_reward, [paths.model(cells[name].model)])
+    method = Method(LEARNERS[cells[name].learner], make_reward)
+    evaluate_method(name, params, method, [paths.model(cells[name].model)])
 
 
 if __name__ == "__main__":

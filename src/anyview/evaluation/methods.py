@@ -1,19 +1,18 @@
-"""A group of runs that train in lockstep, and from its cell of ``params.yaml`` to its learner.
+"""What a method is made of, and the group of runs that it trains in lockstep.
 
-A learner is imported when it is built, so that a cell depends on the code of its own alone. Rewards are made
-by ``rewards.cells`` and by the modules of ``adversarial``.
+The modules of ``learners``, ``rewards`` and ``adversarial`` make learners and rewards; a stage puts them
+together, so that it depends on the code of its own cells alone.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from anyview.config import AdversarialCell, ImitationCell, Params
 from anyview.learners.common.interfaces import Learner, RewardSource
-from anyview.pusher.batch import ACTION_SIZE, ACTIONS, OBSERVATION_SIZE
 from anyview.pusher.contexts import Context
-from anyview.runtime.device import torch_device
 
 
 @dataclass(frozen=True)
@@ -44,33 +43,13 @@ class Scoring:
     judges: bool
 
 
-MakeReward = Callable[[Group], Scoring]
-"""Makes a cell's reward, untrained where it learns."""
+class Method(NamedTuple):
+    """How to make a cell's learner and its reward, both untrained."""
+
+    make_learner: Callable[[Params, Sequence[int]], Learner]
+    make_reward: Callable[[Group], Scoring]
 
 
 def first_demonstration(group: Group) -> np.ndarray:
     """One of the clips that are shown, beside every run (R, 50, H, W, 3)."""
     return np.repeat(group.demonstrations[:1], len(group.runs), axis=0)
-
-
-def make_learner(group: Group) -> Learner:
-    """The cell's learner, untrained."""
-    params = group.params.imitation
-    seed = group.params.base.seed
-    if group.cell.learner == "trpo":
-        from anyview.learners.trpo import TRPO
-
-        return TRPO(params.trpo, seed, group.runs, OBSERVATION_SIZE, ACTION_SIZE, ACTIONS)
-    from anyview.learners.ddpg import DDPG
-
-    return DDPG(
-        params.ddpg,
-        seed,
-        group.runs,
-        OBSERVATION_SIZE,
-        ACTION_SIZE,
-        horizon=ACTIONS,
-        copies=params.episodes_per_iteration,
-        iterations=params.iterations,
-        device=torch_device(),
-    )

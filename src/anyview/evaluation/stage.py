@@ -10,7 +10,7 @@ import pandas as pd
 from anyview import paths
 from anyview.config import Params
 from anyview.evaluation.demonstrations import imitated_demonstrations
-from anyview.evaluation.methods import MakeReward
+from anyview.evaluation.methods import Method
 from anyview.evaluation.runs import evaluate_group, groups_of
 from anyview.learners.common.policies import save_policies
 from anyview.pusher.contexts import sample_contexts
@@ -23,7 +23,7 @@ from anyview.video.files import write_video
 RATE = 10.0  # frames a second
 
 
-def evaluate_method(name: str, params: Params, make_reward: MakeReward, sources: Sequence[Path]) -> None:
+def evaluate_method(name: str, params: Params, method: Method, sources: Sequence[Path]) -> None:
     """Train and evaluate the policies of cell ``name`` into its folder; continues from its checkpoints.
 
     ``sources`` are the folders that its reward is made from, beside the demonstrations.
@@ -40,7 +40,7 @@ def evaluate_method(name: str, params: Params, make_reward: MakeReward, sources:
     groups = groups_of(len(contexts))
     scratch = [scratch_folder("checkpoints", f"{key}-{index}") for index in range(len(groups))]
     units = [
-        (name, params, make_reward, group, [contexts[run] for run in group], demonstrations, folder)
+        (name, params, method, group, [contexts[run] for run in group], demonstrations, folder)
         for group, folder in zip(groups, scratch, strict=True)
     ]
     results = list(run_units(evaluate_group, units))
