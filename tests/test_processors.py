@@ -13,8 +13,8 @@ from tests.long_stages import change, digests
 
 SMALLEST = {
     "simulate.shard": 4,
-    "simulate.diverse.demos": 6,
-    "simulate.narrow.demos": 2,
+    "simulate.sets.diverse.demos": 6,
+    "simulate.sets.narrow.demos": 2,
     "real.film.pairs": 1,
     "real.film.singles": 1,
     "real.film.extreme_pairs": 0,
