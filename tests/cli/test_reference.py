@@ -5,7 +5,7 @@ from pathlib import Path
 from anyview.cli.reference import params_reference
 from anyview.config import load_params
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 
 
 def test_the_params_reference_is_up_to_date():

@@ -2,14 +2,15 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from anyview.video.files import Codec
+if TYPE_CHECKING:
+    from anyview.video.files import Codec
 
 POLICIES = Path("data/policies")
-CODECS: dict[str, Codec] = {".mp4": "XVID", ".avi": "FFV1"}
+CODECS: dict[str, "Codec"] = {".mp4": "XVID", ".avi": "FFV1"}
 
 
 def watch(
