@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from anyview import paths
 from anyview.runtime.errors import AnyviewError
 
 
@@ -22,7 +23,8 @@ def clips(
 
     if sheet is not None and sheet.suffix.lower() != ".png":
         raise AnyviewError(f"{sheet}: a contact sheet is a .png file")
-    found = survey(ingested_source() or load_params().real.source)
+    params = load_params()
+    found = survey(ingested_source() or params.real.source, params.split)
     print(json.dumps(found, indent=2) if as_json else "\n".join(lines(found)))
     if sheet is not None:
         _write_sheet(sheet)
@@ -33,6 +35,6 @@ def _write_sheet(path: Path) -> None:
     from anyview.video.pictures import contact_sheet, write_png
     from anyview.video.sets import open_frames
 
-    store = open_frames(Path("data/real/clips"))
+    store = open_frames(paths.clip_set(paths.REAL))
     labels = [f"{row.clip} {row.kind}" for row in store.manifest.itertuples()]
     write_png(path, contact_sheet(list(store.frames), labels))

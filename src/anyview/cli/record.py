@@ -9,11 +9,14 @@ from typing import Annotated
 
 import typer
 
+from anyview import paths
 from anyview.runtime.errors import AnyviewError
+
+RECORDED = paths.raw("recorded")
 
 
 def record(
-    folder: Annotated[Path, typer.Argument(help="Where clips and manifest go.")] = Path("data/real/raw"),
+    folder: Annotated[Path, typer.Argument(help="Where clips and manifest go.")] = RECORDED,
     camera: Annotated[
         list[str] | None,
         typer.Option(

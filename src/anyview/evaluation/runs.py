@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from anyview.config import Params
-from anyview.evaluation.methods import Group, Scoring, make_learner, make_reward
+from anyview.evaluation.methods import Group, MakeReward, Scoring, make_learner
 from anyview.learners.common.interfaces import Arrays, Learner, RewardSource
 from anyview.pusher.batch import ACTIONS, FRAMES, TOLERANCE, PusherBatch
 from anyview.pusher.contexts import Context
@@ -44,6 +44,7 @@ def groups_of(runs: int) -> list[range]:
 def evaluate_group(
     name: str,
     params: Params,
+    make_reward: MakeReward,
     runs: Sequence[int],
     contexts: Sequence[Context],
     demonstrations: np.ndarray,
@@ -51,12 +52,13 @@ def evaluate_group(
 ) -> Result:
     """Train and evaluate the ``runs`` of cell ``name``, one context each; continues from ``scratch``.
 
-    ``demonstrations`` (m, 50, H, W, 3) uint8 RGB are the expert's clips in other contexts.
+    ``make_reward`` makes the cell's reward. ``demonstrations`` (m, 50, H, W, 3) uint8 RGB are the expert's
+    clips in other contexts.
     """
     use_threads(1)
     positions, _ = roll_out(contexts)
     own = _film(params, contexts, positions)
-    group = Group(params, params.imitation.cells[name], runs, contexts, demonstrations, own)
+    group = Group(params, params.methods[name], runs, contexts, demonstrations, own)
     learner, scoring = make_learner(group), make_reward(group)
     label = f"{name}, runs {runs[0]} to {runs[-1]}"
     curve = _train(label, group, learner, scoring, Checkpoints(scratch))
