@@ -73,7 +73,7 @@ def test_a_weight_of_a_loss_reruns_its_translator_and_what_follows(study):
     }
     metric = "translation.sim-no-alignment.validation.translation"
     told = json.loads(study.run("anyview", "sweep", key, "--metric", metric, "--json"))
-    assert [trial["value"] for trial in told["trials"]] == [0.5, 1.0]
+    assert [experiment["value"] for experiment in told["experiments"]] == [0.5, 1.0]
     study.run("git", "checkout", ".")
     study.run("dvc", "checkout")
 
@@ -92,7 +92,7 @@ def test_a_queue_of_the_whole_pipeline_runs_what_reads_phi(study):
     study.run("dvc", "exp", "run", "--queue", "-S", "imitation.reward.phi=0.3")
     assert work_off_the_queue(study).count("Success") == 1
     told = json.loads(study.run("anyview", "sweep", "imitation.reward.phi", "--json"))
-    (found,) = (trial["experiment"] for trial in told["trials"] if trial["value"] == 0.3)
+    (found,) = (experiment["name"] for experiment in told["experiments"] if experiment["value"] == 0.3)
     study.run("dvc", "exp", "apply", found)
     assert reran(study) == {"check", *cells(study, reads="reward"), "report"}
     study.run("git", "checkout", ".")
@@ -106,7 +106,7 @@ def test_a_queue_of_one_method_and_the_report(study):
     status = work_off_the_queue(study)
     assert status.count("Success") == 3, status
     told = json.loads(study.run("anyview", "sweep", "imitation.reward.phi", "--json"))
-    found = {trial["value"]: trial["experiment"] for trial in told["trials"]}
+    found = {experiment["value"]: experiment["name"] for experiment in told["experiments"]}
     assert {0.01, 0.1, 1} <= found.keys()
     assert (study.folder / "sweep.svg").is_file()
     shown = study.run("dvc", "exp", "show", "--csv")

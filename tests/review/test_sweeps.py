@@ -10,16 +10,16 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import pytest
 
-from anyview.report.figures.sweep import sweep as draw
-from anyview.report.review import Reading
-from anyview.report.sweeps import Sweep, Trial, read_sweep
+from anyview.review.results import Measurement
+from anyview.review.sweep_figure import sweep as draw
+from anyview.review.sweeps import Experiment, Sweep, read_sweep
 from anyview.runtime.errors import AnyviewError
 
 PIPELINE = """stages:
   measure:
     cmd: python measure.py
     params: [imitation, base]
-    metrics:
+    outs:
       - metrics/imitation.json: {cache: false}
 """
 MEASURE = """import json, pathlib, re
@@ -68,9 +68,9 @@ def project(tmp_path_factory) -> Path:
 
 def test_a_sweep_holds_the_experiments_that_vary_its_key_alone(project):
     sweep = read_sweep("imitation.reward.phi", ["imitation.ours.success_rate"], project)
-    assert sweep.values() == [0.01, 0.3, 1]
-    assert [trial.name == sweep.base for trial in sweep.trials] == [False, True, False]
-    assert sweep.trials[2].metrics["imitation.ours.success_rate"] == Reading(0.5, 0.25, 1)
+    assert [experiment.value for experiment in sweep.experiments] == [0.01, 0.3, 1]
+    assert [experiment.name == sweep.base for experiment in sweep.experiments] == [False, True, False]
+    assert sweep.experiments[2].metrics["imitation.ours.success_rate"] == Measurement(0.5, 0.25, 1)
     assert sweep.left_out == 1
 
 
@@ -83,14 +83,14 @@ def test_the_command_prints_and_draws(project):
     ]
     assert [line.split()[1] for line in printed[1:4]] == ["0.01", "0.3", "1"]
     assert printed[4:] == [
-        "left out: 1 that vary something else too, or have no such metrics yet",
+        "left out: 1 that vary something else too, or have no such metrics",
         "drawn: sweep.svg",
     ]
     ElementTree.parse(project / "sweep.svg")
     told = json.loads(
         run(project, "anyview", "sweep", "imitation.reward.phi", "--json", "-o", "a.png").stdout
     )
-    assert [trial["value"] for trial in told["trials"]] == [0.01, 0.3, 1]
+    assert [experiment["value"] for experiment in told["experiments"]] == [0.01, 0.3, 1]
     assert plt.imread(project / "a.png").shape[2] == 4
 
 
@@ -108,7 +108,7 @@ def test_what_cannot_be_drawn_is_told(project, key, metric, complaint):
 
 
 def test_outside_of_a_project(tmp_path):
-    with pytest.raises(AnyviewError, match="dvc exp show: "):
+    with pytest.raises(AnyviewError, match="not inside a Git repository"):
         read_sweep("base.seed", ["imitation.ours.success_rate"], tmp_path)
 
 
@@ -116,16 +116,17 @@ def test_outside_of_a_project(tmp_path):
     ("values", "scale"),
     [
         ([0.0, 0.5, 1.0], "linear"),
-        ([0.01, 0.1, 1.0], "log"),
+        ([0.01, 0.1, 1.0], "symlog"),
         ([0.0, 0.01, 1.0], "symlog"),
-        ([-1.0, 0.01, 1.0], "linear"),
+        ([-1.0, 0.01, 1.0], "symlog"),
         (["adam", "adadelta"], "linear"),
     ],
 )
 def test_every_value_is_a_tick_on_a_fitting_axis(values, scale):
     name = "imitation.ours.final_distance_median"
-    trials = tuple(Trial(str(at), {"key": at}, {name: Reading(0.05, 0.03, 0.08)}) for at in values)
-    figure = draw(Sweep("key", (name,), "", trials, 0))
+    found = {name: Measurement(0.05, 0.03, 0.08)}
+    experiments = tuple(Experiment(str(value), value, found) for value in values)
+    figure = draw(Sweep("key", (name,), "", experiments, 0))
     (axis,) = figure.axes
     assert axis.get_xscale() == scale
     shown = [text.get_text() for text in axis.get_xticklabels()]

@@ -1,6 +1,7 @@
 """`anyview review` against real Git repositories."""
 
 import json
+import re
 import subprocess
 from pathlib import Path
 
@@ -9,8 +10,9 @@ import typer
 from typer.testing import CliRunner
 
 from anyview.cli.review import review
-from anyview.report.review import MetricChange, Reading, compare
-from anyview.report.revisions import Revision, find_revision
+from anyview.review.changes import Change, compare
+from anyview.review.results import Measurement
+from anyview.review.revisions import Revision, find_revision
 from anyview.runtime.errors import AnyviewError
 
 PARAMS = "base: {seed: 42}\nimitation:\n  reward: {phi: 0.3}\n"
@@ -74,24 +76,79 @@ def change_everything(root: Path) -> None:
 
 
 def test_nothing_changed_is_said_so(project):
-    output = run()
-    assert "Params: unchanged" in output
-    assert "Metrics: unchanged" in output
-    assert "Strips: unchanged" in output
-    assert "Unchanged: 2." in output
+    assert run().splitlines()[1:] == [
+        "",
+        "Changed: params 0, metrics 0, pictures 0. Stages: 0 ran again, 2 did not.",
+    ]
 
 
-def test_each_kind_of_change_is_listed(project):
+def in_sight(output: str) -> list[str]:
+    """The lines that a reader sees before unfolding anything."""
+    return re.sub("<details>(<summary>[^<]*</summary>).*?</details>", r"\1", output, flags=re.S).splitlines()
+
+
+def test_what_moved_beyond_its_interval_is_in_sight_and_the_rest_folded(project):
     change_everything(project)
     output = run("HEAD")
+    assert in_sight(output)[2:] == [
+        "Changed: params 1, metrics 1, pictures 1. Stages: 1 ran again, 1 did not.",
+        "",
+        "**Metrics that moved beyond their 95% intervals: 1.** Each value lies outside the other's interval.",
+        "",
+        "| metric | before | after | change |",
+        "| --- | --- | --- | --- |",
+        "| `imitation.ours.success_rate` | 0.8 [0.55, 0.93] | 0.2 [0.07, 0.45] | -0.6 |",
+        "",
+        "<summary>Params (1)</summary>",
+        "<summary>Pictures (1)</summary>",
+        "<summary>Stages that ran again (1)</summary>",
+    ]
     assert "| `imitation.reward.phi` | `0.3` | `1.0` |" in output
-    assert "**0.8 [0.55, 0.93]** | **0.2 [0.07, 0.45]** | **-0.6**" in output
     head = git(project, "rev-parse", "HEAD")
-    assert f"`{head[:10]}:metrics/plots/strip-sim.png` | `metrics/plots/strip-sim.png`" in output
+    assert f"| `{head[:10]}:metrics/plots/strip-sim.png` | `metrics/plots/strip-sim.png` |" in output
     row = "| `imitate@ours` | `imitation.reward.phi`, `src/anyview/learners/ddpg.py` | changed |"
     assert row in output
-    assert "`runs`" not in output
-    assert "Unchanged: 1." in output
+
+
+def estimates(scale: float, *names: str) -> dict[str, float]:
+    return {
+        name + end: scale * factor
+        for name in names
+        for end, factor in (("", 1), ("_low", 0.9), ("_high", 1.1))
+    }
+
+
+def test_a_review_of_the_study_is_a_screenful_when_all_of_it_changed(project):
+    """Fourteen methods and ten translators, every metric of each far beyond its interval."""
+    for scale in (1.0, 2.0):
+        write(project, PARAMS.replace("0.3", str(scale)), {}, LOCK.replace("OUT", str(scale)), b"%f" % scale)
+        returns = ("return_policy", "return_still", "return_arm_only", "return_expert")
+        method = estimates(scale, "success_rate", "final_distance_median", *returns)
+        losses = estimates(scale, "loss", "translation", "reconstruction", "alignment", "psnr", "ssim")
+        for name, values in (
+            ("imitation", {f"method-{index}": method for index in range(14)}),
+            (
+                "translation",
+                {f"cell-{index}": {"validation": losses, "extreme": losses} for index in range(10)},
+            ),
+            ("data", {"sim": estimates(scale, "acceptance") | {"demos": scale}}),
+            ("summary", {"success_percent": {f"method-{index}": 100 * scale for index in range(14)}}),
+        ):
+            (project / f"metrics/{name}.json").write_text(json.dumps(values))
+        if scale == 1:
+            git(project, "add", ".")
+            git(project, "commit", "-qm", "study")
+    output = run("HEAD")
+    changed = 14 * 6 + 10 * 12 + 2
+    assert f"metrics {changed}, pictures 1." in output
+    assert f"**Metrics that moved beyond their 95% intervals: {changed - 1}.**" in output
+    assert len(output.splitlines()) > changed
+    seen = in_sight(output)
+    assert len(seen) <= 60
+    for name in ("success_rate", "final_distance_median"):
+        assert sum(f".{name}`" in line for line in seen) == 14
+    assert sum(".validation.loss`" in line for line in seen) == 10
+    assert "| `imitation.method-13.return_expert` | 1 [0.9, 1.1] | 2 [1.8, 2.2] | +1 |" in output
 
 
 def test_two_commits_and_links_to_pictures(project):
@@ -111,7 +168,9 @@ def test_json_holds_the_same_changes(project):
     assert values["params"] == [{"key": "imitation.reward.phi", "before": 0.3, "after": 1.0}]
     (metric,) = values["metrics"]
     assert metric["key"] == "imitation.ours.success_rate"
-    assert metric["beyond"] is True
+    assert metric["beyond_intervals"] is True
+    assert metric["after"] == {"value": 0.2, "low": 0.07, "high": 0.45}
+    assert [picture["key"] for picture in values["pictures"]] == ["metrics/plots/strip-sim.png"]
     assert [stage["name"] for stage in values["stages"]] == ["imitate@ours"]
 
 
@@ -127,15 +186,15 @@ def test_a_state_without_results_is_no_error(project):
 @pytest.mark.parametrize(
     ("before", "after", "beyond"),
     [
-        (Reading(0.8, 0.5, 0.9), Reading(0.6, 0.3, 0.85), False),
-        (Reading(0.8, 0.7, 0.9), Reading(0.6, 0.5, 0.69), True),
-        (Reading(0.8, 0.7, 0.9), Reading(0.6, 0.2, 0.95), False),
-        (Reading(15), Reading(3), False),
-        (None, Reading(0.6, 0.5, 0.7), False),
+        (Measurement(0.8, 0.5, 0.9), Measurement(0.6, 0.3, 0.85), False),
+        (Measurement(0.8, 0.7, 0.9), Measurement(0.6, 0.5, 0.69), True),
+        (Measurement(0.8, 0.7, 0.9), Measurement(0.6, 0.2, 0.95), False),
+        (Measurement(15), Measurement(3), False),
+        (None, Measurement(0.6, 0.5, 0.7), False),
     ],
 )
 def test_a_metric_is_beyond_only_outside_both_intervals(before, after, beyond):
-    assert MetricChange("x", before, after).beyond is beyond
+    assert Change("x", before, after).beyond_intervals is beyond
 
 
 @pytest.mark.parametrize("revision", ["no-such-branch", "--output=x", "HEAD~7", ""])
