@@ -31,7 +31,7 @@ def to_markdown(review: Review, images: str | None = None) -> str:
     )
     environment.filters |= {"cell": _cell, "difference": _difference, "causes": _causes}
     beyond = sorted((change for change in review.metrics if change.beyond_intervals), key=_place)
-    text = environment.get_template("review.md").render(
+    text = environment.get_template("review.md.jinja").render(
         review=review,
         picture=picture,
         beyond=beyond,
