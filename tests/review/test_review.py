@@ -2,7 +2,6 @@
 
 import json
 import re
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -14,6 +13,7 @@ from anyview.review.changes import Change, compare
 from anyview.review.results import Measurement
 from anyview.review.revisions import Revision, find_revision
 from anyview.runtime.errors import AnyviewError
+from tests.review import commands
 
 PARAMS = "base: {seed: 42}\nimitation:\n  reward: {phi: 0.3}\n"
 METRICS = {"ours": {"runs": 15, "success_rate": 0.8, "success_rate_low": 0.55, "success_rate_high": 0.93}}
@@ -36,8 +36,7 @@ stages:
 
 
 def git(root: Path, *arguments: str) -> str:
-    command = ["git", "-c", "user.name=A", "-c", "user.email=a@example.org", *arguments]
-    return subprocess.run(command, cwd=root, check=True, capture_output=True, text=True).stdout.strip()
+    return commands.run(root, "git", *arguments).strip()
 
 
 def write(root: Path, params: str, metrics: dict, lock: str, strip: bytes) -> None:

@@ -1,9 +1,6 @@
 """`anyview sweep` on real experiments of `dvc exp` in a small project of its own."""
 
 import json
-import os
-import subprocess
-import sys
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
@@ -14,6 +11,7 @@ from anyview.review.results import Measurement
 from anyview.review.sweep_figure import sweep as draw
 from anyview.review.sweeps import Experiment, Sweep, read_sweep
 from anyview.runtime.errors import AnyviewError
+from tests.review.commands import run
 
 PIPELINE = """stages:
   measure:
@@ -33,19 +31,6 @@ pathlib.Path("metrics/imitation.json").write_text(json.dumps({"ours": values | d
 PARAMS = "base: {seed: 1}\nimitation:\n  reward: {phi: 0.3}\n"
 
 
-def run(folder: Path, *command: str) -> subprocess.CompletedProcess[str]:
-    path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
-    done = subprocess.run(
-        command,
-        cwd=folder,
-        env=os.environ | {"PATH": path, "DVC_NO_ANALYTICS": "1"},
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
-    return done
-
-
 @pytest.fixture(scope="module")
 def project(tmp_path_factory) -> Path:
     """Three experiments: two that vary phi, one that varies phi and the seed."""
@@ -53,8 +38,6 @@ def project(tmp_path_factory) -> Path:
     for name, content in (("dvc.yaml", PIPELINE), ("measure.py", MEASURE), ("params.yaml", PARAMS)):
         (folder / name).write_text(content)
     run(folder, "git", "init", "-q", "-b", "main")
-    for key, value in (("user.name", "A"), ("user.email", "a@example.org"), ("core.hooksPath", "/dev/null")):
-        run(folder, "git", "config", key, value)
     run(folder, "dvc", "init", "-q")
     run(folder, "dvc", "repro", "-q")
     run(folder, "git", "add", "-A")
@@ -75,7 +58,7 @@ def test_a_sweep_holds_the_experiments_that_vary_its_key_alone(project):
 
 
 def test_the_command_prints_and_draws(project):
-    printed = run(project, "anyview", "sweep", "imitation.reward.phi").stdout.splitlines()
+    printed = run(project, "anyview", "sweep", "imitation.reward.phi").splitlines()
     assert printed[0].split()[1:] == [
         "imitation.reward.phi",
         "imitation.ours.success_rate",
@@ -87,9 +70,7 @@ def test_the_command_prints_and_draws(project):
         "drawn: sweep.svg",
     ]
     ElementTree.parse(project / "sweep.svg")
-    told = json.loads(
-        run(project, "anyview", "sweep", "imitation.reward.phi", "--json", "-o", "a.png").stdout
-    )
+    told = json.loads(run(project, "anyview", "sweep", "imitation.reward.phi", "--json", "-o", "a.png"))
     assert [experiment["value"] for experiment in told["experiments"]] == [0.01, 0.3, 1]
     assert plt.imread(project / "a.png").shape[2] == 4
 

@@ -7,9 +7,6 @@ from typing import Annotated
 
 import typer
 
-from anyview.review.changes import compare
-from anyview.review.markdown import to_markdown
-from anyview.review.revisions import Revision, find_revision
 from anyview.runtime.errors import AnyviewError
 from anyview.runtime.outputs import write_atomically
 
@@ -31,10 +28,14 @@ def review(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON for a script.")] = False,
 ) -> None:
-    """Summarise what changed since REV: params, metrics beyond their intervals, strips, stages rerun.
+    """Summarise what changed since REV: metrics beyond their intervals, params, pictures, stages rerun.
 
-    Prints Markdown for a pull request, which shows the first and folds the rest.
+    Prints Markdown for a pull request: a screenful of metrics beyond their intervals, the rest folded.
     """
+    from anyview.review.changes import compare
+    from anyview.review.markdown import to_markdown
+    from anyview.review.revisions import Revision, find_revision
+
     root = Path()
     before = find_revision(root, revision)
     after = find_revision(root, to) if to else Revision(root)
@@ -44,7 +45,7 @@ def review(
             asdict(change) | {"beyond_intervals": change.beyond_intervals} for change in changes.metrics
         ]
         states = {"before": before.name, "after": after.name}
-        print(json.dumps(asdict(changes) | states | {"metrics": metrics}, indent=2))
+        print(json.dumps(asdict(changes) | states | {"metrics": metrics}, indent=2, default=str))
     else:
         print(to_markdown(changes, images), end="")
 
