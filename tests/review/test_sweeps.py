@@ -112,5 +112,9 @@ def test_every_value_is_a_tick_on_a_fitting_axis(values, scale):
     assert axis.get_xscale() == scale
     shown = [text.get_text() for text in axis.get_xticklabels()]
     assert shown == [f"{value:g}" if isinstance(value, float) else value for value in values]
+    ticks = axis.transData.transform([(tick, 0) for tick in axis.get_xticks()])
+    across = axis.transAxes.inverted().transform(ticks)[:, 0]
+    assert across.min() < 0.1  # the points take up the whole panel
+    assert across.max() > 0.9
     assert axis.get_ylabel() == "final distance, median (cm)"
     assert axis.get_ylim()[0] < 3 < 8 < axis.get_ylim()[1]

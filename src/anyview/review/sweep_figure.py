@@ -22,10 +22,10 @@ def sweep(content: Sweep) -> Figure:
     numeric = all(map(is_number, values))
     places = np.asarray(values, float) if numeric else np.arange(len(values), dtype=float)
     with canvas(2.1 * len(content.metrics) + 0.6, rows=len(content.metrics), sharex=True) as (figure, axes):
-        for axis, metric in zip(axes, content.metrics, strict=True):
-            _panel(axis, content, metric, places)
         if numeric:
             _scale(axes[-1], places)
+        for axis, metric in zip(axes, content.metrics, strict=True):
+            _panel(axis, content, metric, places)
         axes[-1].set_xticks(np.unique(places), list(dict.fromkeys(map(_shown, values))))
         axes[-1].set_xlabel(content.key)
         if axes[0].get_legend_handles_labels()[1]:
