@@ -15,7 +15,7 @@ from anyview.review.revisions import Revision, find_revision
 from anyview.runtime.errors import AnyviewError
 from tests.review import commands
 
-PARAMS = "base: {seed: 42}\nimitation:\n  reward: {phi: 0.3}\n"
+PARAMS = "base: {seed: 42}\nimitation:\n  ddpg: {discount: 0.3}\n"
 METRICS = {"ours": {"runs": 15, "success_rate": 0.8, "success_rate_low": 0.55, "success_rate_high": 0.93}}
 LOCK = """schema: '2.0'
 stages:
@@ -25,7 +25,7 @@ stages:
     - {path: src/anyview/learners/ddpg.py, hash: md5, md5: aaa, size: 1}
     params:
       params.yaml:
-        imitation.reward: {phi: PHI}
+        imitation.ddpg: {discount: DISCOUNT}
     outs:
     - {path: data/policies/ours, hash: md5, md5: OUT.dir, size: 1, nfiles: 1}
   simulate@diverse:
@@ -53,7 +53,7 @@ def project(tmp_path, monkeypatch):
     git(tmp_path, "init", "-q")
     root = tmp_path / "study"
     root.mkdir()
-    write(root, PARAMS, METRICS, LOCK.replace("PHI", "0.3").replace("OUT", "bbb"), b"before")
+    write(root, PARAMS, METRICS, LOCK.replace("DISCOUNT", "0.3").replace("OUT", "bbb"), b"before")
     git(tmp_path, "add", ".")
     git(tmp_path, "commit", "-qm", "first")
     monkeypatch.chdir(root)
@@ -70,7 +70,7 @@ def run(*arguments: str) -> str:
 
 def change_everything(root: Path) -> None:
     far = {"runs": 15, "success_rate": 0.2, "success_rate_low": 0.07, "success_rate_high": 0.45}
-    lock = LOCK.replace("PHI", "1.0").replace("OUT", "ddd").replace("aaa", "eee")
+    lock = LOCK.replace("DISCOUNT", "1.0").replace("OUT", "ddd").replace("aaa", "eee")
     write(root, PARAMS.replace("0.3", "1.0"), {"ours": far}, lock, b"after")
 
 
@@ -102,10 +102,10 @@ def test_what_moved_beyond_its_interval_is_in_sight_and_the_rest_folded(project)
         "<summary>Pictures (1)</summary>",
         "<summary>Stages that ran again (1)</summary>",
     ]
-    assert "| `imitation.reward.phi` | `0.3` | `1.0` |" in output
+    assert "| `imitation.ddpg.discount` | `0.3` | `1.0` |" in output
     head = git(project, "rev-parse", "HEAD")
     assert f"| `{head[:10]}:metrics/plots/strip-sim.png` | `metrics/plots/strip-sim.png` |" in output
-    row = "| `imitate@ours` | `imitation.reward.phi`, `src/anyview/learners/ddpg.py` | changed |"
+    row = "| `imitate@ours` | `imitation.ddpg.discount`, `src/anyview/learners/ddpg.py` | changed |"
     assert row in output
 
 
@@ -164,7 +164,7 @@ def test_two_commits_and_links_to_pictures(project):
 def test_json_holds_the_same_changes(project):
     change_everything(project)
     values = json.loads(run("--json"))
-    assert values["params"] == [{"key": "imitation.reward.phi", "before": 0.3, "after": 1.0}]
+    assert values["params"] == [{"key": "imitation.ddpg.discount", "before": 0.3, "after": 1.0}]
     (metric,) = values["metrics"]
     assert metric["key"] == "imitation.ours.success_rate"
     assert metric["beyond_intervals"] is True

@@ -22,18 +22,18 @@ PIPELINE = """stages:
 """
 MEASURE = """import json, pathlib, re
 text = open("params.yaml").read()
-phi, seed = (float(re.search(name + r": ([\\d.]+)", text)[1]) for name in ("phi", "seed"))
-values = {"success_rate": phi / 2, "success_rate_low": phi / 4, "success_rate_high": phi}
+discount, seed = (float(re.search(name + r": ([\\d.]+)", text)[1]) for name in ("discount", "seed"))
+values = {"success_rate": discount / 2, "success_rate_low": discount / 4, "success_rate_high": discount}
 distance = {"final_distance_median": 0.1 * seed}
 pathlib.Path("metrics").mkdir(exist_ok=True)
 pathlib.Path("metrics/imitation.json").write_text(json.dumps({"ours": values | distance}))
 """
-PARAMS = "base: {seed: 1}\nimitation:\n  reward: {phi: 0.3}\n"
+PARAMS = "base: {seed: 1}\nimitation:\n  ddpg: {discount: 0.3}\n"
 
 
 @pytest.fixture(scope="module")
 def project(tmp_path_factory) -> Path:
-    """Three experiments: two that vary phi, one that varies phi and the seed."""
+    """Three experiments: two that vary discount, one that varies discount and the seed."""
     folder = tmp_path_factory.mktemp("sweep")
     for name, content in (("dvc.yaml", PIPELINE), ("measure.py", MEASURE), ("params.yaml", PARAMS)):
         (folder / name).write_text(content)
@@ -42,15 +42,15 @@ def project(tmp_path_factory) -> Path:
     run(folder, "dvc", "repro", "-q")
     run(folder, "git", "add", "-A")
     run(folder, "git", "commit", "-qm", "start")
-    phi = "imitation.reward.phi"
-    for settings in ([f"{phi}=1"], [f"{phi}=0.01"], [f"{phi}=0.1", "base.seed=2"]):
+    discount = "imitation.ddpg.discount"
+    for settings in ([f"{discount}=1"], [f"{discount}=0.01"], [f"{discount}=0.1", "base.seed=2"]):
         run(folder, "dvc", "exp", "run", "-q", *(part for each in settings for part in ("-S", each)))
     run(folder, "git", "checkout", "-q", ".")
     return folder
 
 
 def test_a_sweep_holds_the_experiments_that_vary_its_key_alone(project):
-    sweep = read_sweep("imitation.reward.phi", ["imitation.ours.success_rate"], project)
+    sweep = read_sweep("imitation.ddpg.discount", ["imitation.ours.success_rate"], project)
     assert [experiment.value for experiment in sweep.experiments] == [0.01, 0.3, 1]
     assert [experiment.name == sweep.base for experiment in sweep.experiments] == [False, True, False]
     assert sweep.experiments[2].metrics["imitation.ours.success_rate"] == Measurement(0.5, 0.25, 1)
@@ -58,9 +58,9 @@ def test_a_sweep_holds_the_experiments_that_vary_its_key_alone(project):
 
 
 def test_the_command_prints_and_draws(project):
-    printed = run(project, "anyview", "sweep", "imitation.reward.phi").splitlines()
+    printed = run(project, "anyview", "sweep", "imitation.ddpg.discount").splitlines()
     assert printed[0].split()[1:] == [
-        "imitation.reward.phi",
+        "imitation.ddpg.discount",
         "imitation.ours.success_rate",
         "imitation.ours.final_distance_median",
     ]
@@ -70,7 +70,7 @@ def test_the_command_prints_and_draws(project):
         "drawn: sweep.svg",
     ]
     ElementTree.parse(project / "sweep.svg")
-    told = json.loads(run(project, "anyview", "sweep", "imitation.reward.phi", "--json", "-o", "a.png"))
+    told = json.loads(run(project, "anyview", "sweep", "imitation.ddpg.discount", "--json", "-o", "a.png"))
     assert [experiment["value"] for experiment in told["experiments"]] == [0.01, 0.3, 1]
     assert plt.imread(project / "a.png").shape[2] == 4
 
@@ -78,9 +78,9 @@ def test_the_command_prints_and_draws(project):
 @pytest.mark.parametrize(
     ("key", "metric", "complaint"),
     [
-        ("imitation.reward.phy", "imitation.ours.success_rate", "no such key in params.yaml"),
+        ("imitation.ddpg.discuont", "imitation.ours.success_rate", "no such key in params.yaml"),
         ("base.seed", "imitation.ours.success_rate", "no finished experiment of this commit varies it alone"),
-        ("imitation.reward.phi", "imitation.ours.sucess", "has imitation.ours.sucess"),
+        ("imitation.ddpg.discount", "imitation.ours.sucess", "has imitation.ours.sucess"),
     ],
 )
 def test_what_cannot_be_drawn_is_told(project, key, metric, complaint):

@@ -51,7 +51,9 @@ def review(
 
 
 def sweep(
-    key: Annotated[str, typer.Argument(metavar="KEY", help="Of params.yaml, such as imitation.reward.phi.")],
+    key: Annotated[
+        str, typer.Argument(metavar="KEY", help="Of params.yaml, such as imitation.cells.ours.weights.image.")
+    ],
     metric: Annotated[
         list[str] | None,
         typer.Option(
