@@ -5,13 +5,13 @@ Usage: python stages/imitate.py CELL
 
 from anyview import paths
 from anyview.config import load_params
-from anyview.evaluation.methods import Method
+from anyview.evaluation.methods import MakeLearner, Method
 from anyview.evaluation.stage import evaluate_method
 from anyview.learners import ddpg, trpo
 from anyview.rewards.cells import make_reward
 from anyview.runtime.errors import choose, run_stage
 
-LEARNERS = {"ddpg": ddpg.make_learner, "trpo": trpo.make_learner}
+LEARNERS: dict[str, MakeLearner] = {"ddpg": ddpg.make_learner, "trpo": trpo.make_learner}
 
 
 def main(arguments: list[str]) -> None:

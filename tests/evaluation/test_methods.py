@@ -12,7 +12,9 @@ from anyview.adversarial import gail, tpil
 from anyview.config import Params, parse_params, read_yaml
 from anyview.embedding.embedding import Embedding, load_embedding, save_embedding
 from anyview.evaluation.demonstrations import imitated_demonstrations, training_clips
+from anyview.evaluation.methods import Method
 from anyview.evaluation.runs import evaluate_group
+from anyview.learners import ddpg, trpo
 from anyview.pusher.batch import PusherBatch
 from anyview.pusher.contexts import Context, sample_contexts
 from anyview.rewards.cells import make_reward
@@ -21,7 +23,11 @@ from anyview.seeds import stream
 from anyview.translator.network import to_input
 from anyview.video.sets import write_set, write_shard
 
-REWARDS = {"gail": gail.make_reward, "tpil": tpil.make_reward, "tcn": make_reward}
+METHODS = {
+    "gail": Method(trpo.make_learner, gail.make_reward),
+    "tpil": Method(trpo.make_learner, tpil.make_reward),
+    "tcn": Method(ddpg.make_learner, make_reward),
+}
 
 
 @pytest.fixture(scope="module")
@@ -79,12 +85,12 @@ def study(tmp_path_factory, root, model, contexts, expert_clips) -> Iterator[Par
         yield parse_params(values)
 
 
-@pytest.mark.parametrize("cell", REWARDS)
+@pytest.mark.parametrize("cell", METHODS)
 def test_the_evaluation_runs_each_baseline(study: Params, tmp_path: Path, cell: str):
     contexts, _ = sample_contexts(stream(1, "test"), 2)
     clips, demonstrations = imitated_demonstrations(study)
     assert clips == ["c0"]
-    result = evaluate_group(cell, study, REWARDS[cell], range(2), contexts, demonstrations, tmp_path)
+    result = evaluate_group(cell, study, METHODS[cell], range(2), contexts, demonstrations, tmp_path)
     assert np.isfinite(result.curve.to_numpy()).all()
     assert len(result.curve) == 2 * 4
     assert result.rollouts.shape == (2, 50, 32, 64, 3)

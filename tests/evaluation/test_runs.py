@@ -13,7 +13,9 @@ import pytest
 from ruamel.yaml import YAML
 
 from anyview.config import load_params
+from anyview.evaluation.methods import Method
 from anyview.evaluation.runs import evaluate_group, groups_of
+from anyview.learners import ddpg
 from anyview.learners.common.policies import load_policy
 from anyview.pusher.batch import PusherBatch
 from anyview.pusher.contexts import sample_contexts
@@ -23,6 +25,8 @@ from anyview.seeds import stream
 from anyview.translator.weights import save_translator
 from anyview.video.files import read_video
 from anyview.video.sets import write_set, write_shard
+
+OURS = Method(ddpg.make_learner, make_reward)
 
 
 @pytest.fixture(scope="module")
@@ -140,7 +144,7 @@ def test_an_interrupted_group_ends_with_the_same_results(
     monkeypatch.chdir(study)
     params = load_params()
     contexts, _ = sample_contexts(stream(0, "test"), 2)
-    work = ("ours", params, make_reward, [0, 1], contexts, expert_clips[:2])
+    work = ("ours", params, OURS, [0, 1], contexts, expert_clips[:2])
     whole = evaluate_group(*work, tmp_path / "whole")
 
     class Stop(Exception):
@@ -174,11 +178,9 @@ def test_a_run_in_lockstep_is_the_same_run_alone(study: Path, tmp_path: Path, ex
     params = load_params()
     contexts, _ = sample_contexts(stream(0, "test"), 3)
     together = evaluate_group(
-        "ours", params, make_reward, [0, 1, 2], contexts, expert_clips[:2], tmp_path / "together"
+        "ours", params, OURS, [0, 1, 2], contexts, expert_clips[:2], tmp_path / "together"
     )
-    alone = evaluate_group(
-        "ours", params, make_reward, [1], contexts[1:2], expert_clips[:2], tmp_path / "alone"
-    )
+    alone = evaluate_group("ours", params, OURS, [1], contexts[1:2], expert_clips[:2], tmp_path / "alone")
     same = together.runs[together.runs["run"] == 1].reset_index(drop=True)
     pd.testing.assert_frame_equal(alone.runs, same, rtol=1e-4)
     for name, weights in alone.policies.items():

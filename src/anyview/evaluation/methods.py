@@ -43,11 +43,15 @@ class Scoring:
     judges: bool
 
 
+MakeLearner = Callable[[Params, Sequence[int]], Learner]
+MakeReward = Callable[[Group], Scoring]
+
+
 class Method(NamedTuple):
     """How to make a cell's learner and its reward, both untrained."""
 
-    make_learner: Callable[[Params, Sequence[int]], Learner]
-    make_reward: Callable[[Group], Scoring]
+    make_learner: MakeLearner
+    make_reward: MakeReward
 
 
 def first_demonstration(group: Group) -> np.ndarray:
