@@ -21,8 +21,8 @@ from anyview.pusher.expert import roll_out
 from anyview.pusher.render import renderer
 from anyview.rewards.demonstration import translate_demonstrations
 from anyview.seeds import stream
-from anyview.translator.network import to_input
 from anyview.translator.weights import load_translator
+from anyview.video.pixels import to_input
 
 REACH = 6  # centimetres each way
 

@@ -1,33 +1,30 @@
-"""Stage `train`: one translator cell, or the embedding of the `tcn` baseline, into data/models/<cell>.
+"""Stage `train`: one translator cell, into data/models/<cell>.
 
-Usage: python stages/train.py CELL [DATASET]
+Usage: python stages/train.py CELL
 """
 
 from pathlib import Path
 
-from anyview.config import EmbeddingCell, load_params
+from anyview.config import TranslatorCell, load_params
 from anyview.runtime.errors import AnyviewError, run_stage
-from anyview.training.sampling import check_dataset
-from anyview.training.trainer import Recipe
-from anyview.training.training import train_translator
+from anyview.training.fit import fit
+from anyview.training.translator import TranslatorObjective
+from anyview.video.datasets import open_dataset
 
 
 def main(arguments: list[str]) -> None:
-    """Train one cell; an interrupted training continues."""
+    """Train one translator; an interrupted training continues."""
     params = load_params()
-    cells = params.translation.cells
-    if len(arguments) not in (1, 2) or arguments[0] not in cells:
+    cells = {
+        name: cell for name, cell in params.translation.cells.items() if isinstance(cell, TranslatorCell)
+    }
+    if len(arguments) != 1 or arguments[0] not in cells:
         raise AnyviewError(f"usage: python stages/train.py CELL, where CELL is one of {', '.join(cells)}")
     name = arguments[0]
     cell = cells[name]
-    check_dataset(name, cell.dataset, arguments[1:])
-    output = Path("data/models") / name
-    if isinstance(cell, EmbeddingCell):
-        from anyview.embedding.embedding import train_embedding
-
-        train_embedding(name, cell, params.translation.training, params.base.seed, output)
-    else:
-        train_translator(Recipe(name, cell, params.translation.training, params.base.seed), output)
+    dataset = open_dataset(cell.dataset)
+    objective = TranslatorObjective(cell, params.translation.training, params.base.seed, dataset)
+    fit(name, objective, Path("data/models") / name)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Stage `translate`: what a trained translator makes of held-out clips, into data/translations/<cell>.
 
-Usage: python stages/translate.py CELL [DATASET]
+Usage: python stages/translate.py CELL
 """
 
 from pathlib import Path
@@ -10,8 +10,8 @@ from anyview.config import TranslatorCell, load_params
 from anyview.runtime.errors import AnyviewError, run_stage
 from anyview.runtime.outputs import whole_folder
 from anyview.seeds import stream
-from anyview.training.sampling import check_dataset, open_dataset
 from anyview.translator.weights import load_translator
+from anyview.video.datasets import open_dataset
 
 
 def main(arguments: list[str]) -> None:
@@ -20,10 +20,9 @@ def main(arguments: list[str]) -> None:
     cells = {
         name: cell for name, cell in params.translation.cells.items() if isinstance(cell, TranslatorCell)
     }
-    if len(arguments) not in (1, 2) or arguments[0] not in cells:
+    if len(arguments) != 1 or arguments[0] not in cells:
         raise AnyviewError(f"usage: python stages/translate.py CELL, where CELL is one of {', '.join(cells)}")
     name = arguments[0]
-    check_dataset(name, cells[name].dataset, arguments[1:])
     model = load_translator(Path("data/models") / name)
     dataset = open_dataset(cells[name].dataset)
     with whole_folder(Path("data/translations") / name) as folder:

@@ -7,7 +7,7 @@ from torch.nn import functional as F
 from anyview.adversarial import tpil
 from anyview.adversarial.tpil import PairDiscriminator, ReverseGradient, tpil_reward
 from anyview.pusher.batch import PusherBatch
-from anyview.translator.network import to_input
+from anyview.video.pixels import to_input
 from tests.learners.toy import LAST, PARAMS, SIZE, clip_set, expert_motion, random_motion, show, squares
 
 

@@ -9,14 +9,15 @@ import pytest
 import torch
 
 from anyview.config import Params, Reward, parse_params, read_yaml
-from anyview.embedding.embedding import Embedding, load_embedding, save_embedding
+from anyview.embedding.network import Embedding
+from anyview.embedding.weights import load_embedding, save_embedding
 from anyview.evaluation.demonstrations import imitated_demonstrations, training_clips
 from anyview.evaluation.runs import evaluate_group
 from anyview.pusher.batch import PusherBatch
 from anyview.pusher.contexts import Context, sample_contexts
 from anyview.rewards.embedding import EmbeddingReward
 from anyview.seeds import stream
-from anyview.translator.network import to_input
+from anyview.video.pixels import to_input
 from anyview.video.sets import write_set, write_shard
 
 PARAMS = Reward(phi=0.3, time_power=2.0, demonstrations=2)

@@ -6,7 +6,8 @@ import torch
 
 from anyview import config
 from anyview.rewards.demonstration import DemonstrationReward, translate_demonstrations, true_demonstrations
-from anyview.translator.network import ContextTranslator, to_input
+from anyview.translator.network import ContextTranslator
+from anyview.video.pixels import to_input
 
 
 def literal(

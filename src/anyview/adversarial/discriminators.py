@@ -15,7 +15,7 @@ from torch.nn import functional as F
 from anyview import config
 from anyview.learners.common.interfaces import Arrays
 from anyview.seeds import stream, torch_seed
-from anyview.translator.network import to_input
+from anyview.video.pixels import to_input
 
 
 @dataclass(frozen=True)

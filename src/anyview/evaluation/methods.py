@@ -104,7 +104,7 @@ def _demonstrated(group: Group) -> Scoring:
 
 def _embedded(group: Group) -> Scoring:
     """The distance to the demonstrations in a time-contrastive embedding, which nothing translates."""
-    from anyview.embedding.embedding import load_embedding
+    from anyview.embedding.weights import load_embedding
     from anyview.rewards.embedding import EmbeddingReward
 
     folder, size = Path(group.cell.source), group.params.sim.image_size

@@ -13,7 +13,8 @@ from torch import Tensor
 
 from anyview import config
 from anyview.learners.common.interfaces import Arrays
-from anyview.translator.network import ContextTranslator, to_frames, to_input
+from anyview.translator.network import ContextTranslator
+from anyview.video.pixels import to_frames, to_input
 
 _BATCH = 64
 

@@ -5,9 +5,9 @@ import torch
 from torch import Tensor
 
 from anyview import config
-from anyview.embedding.embedding import Embedding
+from anyview.embedding.network import Embedding
 from anyview.learners.common.interfaces import Arrays
-from anyview.translator.network import to_input
+from anyview.video.pixels import to_input
 
 
 class EmbeddingReward:

@@ -1,1 +1,1 @@
-"""How networks are trained: batches, optimisation, the loop with its checkpoints."""
+"""How networks are trained: one loop, what it minimises, batches, optimisation, augmentation."""
