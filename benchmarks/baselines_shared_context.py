@@ -13,7 +13,7 @@ import sys
 import numpy as np
 import torch
 
-from anyview.adversarial.discriminators import ClipSet, LearnedReward
+from anyview.adversarial.common.discriminators import ClipSet, LearnedReward
 from anyview.adversarial.gail import gail_reward
 from anyview.adversarial.tpil import random_motion, tpil_reward
 from anyview.analysis.statistics import bootstrap_interval

@@ -30,8 +30,8 @@ from torch.utils.flop_counter import FlopCounterMode
 from anyview.config import LossWeights, Training, TranslatorCell
 from anyview.runtime.device import worker_count
 from anyview.seeds import torch_seed
-from anyview.training.fit import update, validate
-from anyview.training.optimization import SharedOptimizer
+from anyview.training.common.fit import update, validate
+from anyview.training.common.optimization import SharedOptimizer
 from anyview.training.translator import TranslatorObjective
 from anyview.translator.losses import batch_losses
 from anyview.translator.network import ARCHITECTURES, ContextTranslator
@@ -63,8 +63,7 @@ def make_dataset(size: int) -> Dataset:
 
 def make_objective(architecture: str, dataset: Dataset, seed: int = 0) -> TranslatorObjective:
     cell = TranslatorCell(
-        method="translator",
-        dataset="sim-diverse",
+        dataset="diverse",
         architecture=architecture,
         optimizer="adam",
         iterations=1000,

@@ -1,30 +1,23 @@
-"""Stage `train`: one translator cell, into data/models/<cell>.
+"""Stage `train`: one context translator, into data/models/<cell>.
 
 Usage: python stages/train.py CELL
 """
 
-from pathlib import Path
-
-from anyview.config import TranslatorCell, load_params
-from anyview.runtime.errors import AnyviewError, run_stage
-from anyview.training.fit import fit
+from anyview import paths
+from anyview.config import load_params
+from anyview.runtime.errors import choose, run_stage
+from anyview.training.common.fit import fit
 from anyview.training.translator import TranslatorObjective
 from anyview.video.datasets import open_dataset
 
 
 def main(arguments: list[str]) -> None:
-    """Train one translator; an interrupted training continues."""
+    """Train one cell; an interrupted training continues."""
     params = load_params()
-    cells = {
-        name: cell for name, cell in params.translation.cells.items() if isinstance(cell, TranslatorCell)
-    }
-    if len(arguments) != 1 or arguments[0] not in cells:
-        raise AnyviewError(f"usage: python stages/train.py CELL, where CELL is one of {', '.join(cells)}")
-    name = arguments[0]
-    cell = cells[name]
-    dataset = open_dataset(cell.dataset)
-    objective = TranslatorObjective(cell, params.translation.training, params.base.seed, dataset)
-    fit(name, objective, Path("data/models") / name)
+    name = choose(arguments, params.translators, "python stages/train.py CELL")
+    cell = params.translators[name]
+    objective = TranslatorObjective(cell, params.training, params.base.seed, open_dataset(cell.dataset))
+    fit(name, objective, paths.model(name))
 
 
 if __name__ == "__main__":

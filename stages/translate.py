@@ -3,11 +3,10 @@
 Usage: python stages/translate.py CELL
 """
 
-from pathlib import Path
-
+from anyview import paths
 from anyview.assessment.evaluation import evaluate
-from anyview.config import TranslatorCell, load_params
-from anyview.runtime.errors import AnyviewError, run_stage
+from anyview.config import load_params
+from anyview.runtime.errors import choose, run_stage
 from anyview.runtime.outputs import whole_folder
 from anyview.seeds import stream
 from anyview.translator.weights import load_translator
@@ -17,17 +16,12 @@ from anyview.video.datasets import open_dataset
 def main(arguments: list[str]) -> None:
     """Evaluate the translator of one cell."""
     params = load_params()
-    cells = {
-        name: cell for name, cell in params.translation.cells.items() if isinstance(cell, TranslatorCell)
-    }
-    if len(arguments) != 1 or arguments[0] not in cells:
-        raise AnyviewError(f"usage: python stages/translate.py CELL, where CELL is one of {', '.join(cells)}")
-    name = arguments[0]
-    model = load_translator(Path("data/models") / name)
-    dataset = open_dataset(cells[name].dataset)
-    with whole_folder(Path("data/translations") / name) as folder:
+    name = choose(arguments, params.translators, "python stages/translate.py CELL")
+    model = load_translator(paths.model(name))
+    dataset = open_dataset(params.translators[name].dataset)
+    with whole_folder(paths.translations(name)) as folder:
         rng = stream(params.base.seed, f"translate/{name}")
-        evaluate(model, dataset, folder, params.translation.evaluation, rng)
+        evaluate(model, dataset, folder, params.assessment, rng)
 
 
 if __name__ == "__main__":

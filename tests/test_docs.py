@@ -102,7 +102,7 @@ def test_keys_of_params_exist(path):
     text = path.read_text(encoding="utf-8")
     named = re.findall(rf"`((?:{'|'.join(params)})\.[\w.-]+[\w])(?:: [^`]*)?`", prose(path))
     named += re.findall(r"-S '?([\w.-]+)=", text)
-    unknown = {"imitation.reward.phy"} | ({name for name in named if name.endswith(".py")})
+    unknown = {"imitation.phy"} | ({name for name in named if name.endswith(".py")})
     assert {name for name in named if "<" not in name} - keys - blocks - unknown == set()
 
 

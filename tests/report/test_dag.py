@@ -16,14 +16,14 @@ PIPELINE = {
     "stages": {
         "simulate": {
             "foreach": ["diverse", "narrow"],
-            "do": {"cmd": "x", "desc": "film the expert", "outs": ["data/sim/${item}"]},
+            "do": {"cmd": "x", "desc": "film the expert", "outs": ["data/clips/${item}"]},
         },
-        "split": {"cmd": "x", "deps": ["data/sim/diverse"], "outs": [{"data/splits": {"cache": False}}]},
+        "split": {"cmd": "x", "deps": ["data/clips/diverse"], "outs": [{"data/splits": {"cache": False}}]},
         "train": {
             "foreach": "${translation.cells}",
             "do": {
                 "cmd": "x",
-                "deps": ["data/sim/${item.dataset}", "data/splits/sim.csv"],
+                "deps": ["data/clips/${item.dataset}", "data/splits/sim.csv"],
                 "outs": ["data/models/${key}"],
             },
         },
@@ -31,7 +31,7 @@ PIPELINE = {
             "foreach": "${imitation.cells}",
             "do": {
                 "cmd": "x",
-                "deps": ["${item.source}", "data/sim/diverse"],
+                "deps": ["${item.source}", "data/clips/diverse"],
                 "outs": ["data/policies/${key}"],
             },
         },

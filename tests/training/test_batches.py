@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from anyview.training.batches import (
+from anyview.training.common.batches import (
     FramePairs,
     training_pairs,
     training_triplets,

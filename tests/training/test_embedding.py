@@ -10,14 +10,14 @@ import pytest
 from anyview.config import EmbeddingCell, Training
 from anyview.embedding.weights import load_embedding
 from anyview.runtime.errors import AnyviewError
-from anyview.training.batches import FramePairs
+from anyview.training.common.batches import FramePairs
+from anyview.training.common.fit import fit
 from anyview.training.embedding import EmbeddingObjective
-from anyview.training.fit import fit
 from anyview.video.datasets import open_dataset
 from anyview.video.sets import write_clips, write_set
 from tests.training.discworld import clip_table
 
-CELL = EmbeddingCell(method="time-contrastive", dataset="sim-diverse", iterations=6, dimensions=8, margin=0.2)
+CELL = EmbeddingCell(dataset="diverse", iterations=6, dimensions=8, margin=0.2)
 TRAINING = Training(
     batch_size=40,
     learning_rate=0.001,
@@ -40,11 +40,11 @@ def clocks(tmp_path, monkeypatch) -> None:
         for t, frame in enumerate(clip):
             frame[15 - t :, left : left + 4] = rng.integers(200, 256)
     table = clip_table(["train"] * 100 + ["validation"] * 20)
-    folder = tmp_path / "data/sim/diverse"
+    folder = tmp_path / "data/clips/diverse"
     folder.mkdir(parents=True)
     write_set(folder, table[["clip"]], [write_clips(folder / "shard-0000.avi", clips, 10.0)])
     (tmp_path / "data/splits").mkdir()
-    table.to_csv(tmp_path / "data/splits/sim-diverse.csv", index=False)
+    table.to_csv(tmp_path / "data/splits/diverse.csv", index=False)
     monkeypatch.chdir(tmp_path)
 
 
@@ -52,7 +52,7 @@ def clocks(tmp_path, monkeypatch) -> None:
 def test_it_learns_to_tell_the_time_across_views():
     cell = CELL.model_copy(update={"iterations": 150})
     training = TRAINING.model_copy(update={"validation_every": 50})
-    fit("tcn", EmbeddingObjective(cell, training, 1, open_dataset("sim-diverse")), OUTPUT)
+    fit("tcn", EmbeddingObjective(cell, training, 1, open_dataset("diverse")), OUTPUT)
     curve = pd.read_csv(OUTPUT / "curve.csv")
     assert list(curve) == ["iteration", "loss", "validation_loss", "validation_time_error"]
     assert list(curve["iteration"]) == [50, 100, 150]

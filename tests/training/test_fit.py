@@ -14,9 +14,9 @@ import pytest
 import torch
 
 from anyview.runtime.errors import AnyviewError
-from anyview.training.batches import FramePairs, validation_pairs
-from anyview.training.fit import LIVE_CURVES, fit, update, validate
-from anyview.training.optimization import SharedOptimizer
+from anyview.training.common.batches import FramePairs, validation_pairs
+from anyview.training.common.fit import LIVE_CURVES, fit, update, validate
+from anyview.training.common.optimization import SharedOptimizer
 from anyview.training.translator import TranslatorObjective
 from anyview.translator.weights import load_translator, read_meta
 from anyview.video.pixels import to_input
@@ -83,7 +83,7 @@ def test_killed_training_continues_to_the_same_bytes(pipeline, make_objective):
     made = make_objective(iterations=30)
     fit("sim", made, Path("alone"))
     program = (
-        "import sys; from pathlib import Path; from anyview.training.fit import fit;"
+        "import sys; from pathlib import Path; from anyview.training.common.fit import fit;"
         "from anyview.training.translator import TranslatorObjective;"
         "from anyview.video.datasets import open_dataset;"
         "from anyview.config import TranslatorCell, Training;"

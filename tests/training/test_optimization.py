@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from torch import nn
 
-from anyview.training.optimization import SharedOptimizer, learning_rate
+from anyview.training.common.optimization import SharedOptimizer, learning_rate
 
 SHAPES = [(4, 3, 5, 5), (4,), (7, 12), (7,), (2, 7), (2,)]
 MAKES = {

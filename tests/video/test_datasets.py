@@ -39,19 +39,19 @@ def test_extreme_clips_are_targets_of_standard_validation_clips(views):
 
 @pytest.fixture
 def clips(tmp_path, monkeypatch) -> np.ndarray:
-    """Six clips, in a working folder in which the stages before have made data/sim/diverse and its split."""
+    """Six clips, in a folder in which the stages before have made data/clips/diverse and its split."""
     clips, table = disc_clips(6), clip_table(["train"] * 4 + ["validation"] * 2)
-    folder = tmp_path / "data/sim/diverse"
+    folder = tmp_path / "data/clips/diverse"
     folder.mkdir(parents=True)
     write_set(folder, table[["clip"]], [write_clips(folder / "shard-0000.avi", clips, 10.0)])
     (tmp_path / "data/splits").mkdir()
-    table.to_csv(tmp_path / "data/splits/sim-diverse.csv", index=False)
+    table.to_csv(tmp_path / "data/splits/diverse.csv", index=False)
     monkeypatch.chdir(tmp_path)
     return clips
 
 
 def test_dataset_joins_clips_with_their_split(clips):
-    dataset = open_dataset("sim-diverse")
+    dataset = open_dataset("diverse")
     assert np.array_equal(dataset.frames, clips)
     assert list(dataset.split("validation")) == [4, 5]
     assert list(dataset.split("extreme")) == []
@@ -59,11 +59,11 @@ def test_dataset_joins_clips_with_their_split(clips):
 
 @pytest.mark.usefixtures("clips")
 def test_split_that_does_not_fit_the_clips_is_refused():
-    path = Path("data/splits/sim-diverse.csv")
+    path = Path("data/splits/diverse.csv")
     table = pd.read_csv(path)
     table.assign(clip=["stranger", *table["clip"][1:]]).to_csv(path, index=False)
     with pytest.raises(AnyviewError, match="stranger"):
-        open_dataset("sim-diverse")
+        open_dataset("diverse")
     table.assign(split="train").to_csv(path, index=False)
     with pytest.raises(AnyviewError, match="validation"):
-        open_dataset("sim-diverse")
+        open_dataset("diverse")

@@ -13,7 +13,7 @@ from anyview.runtime.errors import AnyviewError
 
 
 def record(
-    folder: Annotated[Path, typer.Argument(help="Where clips and manifest go.")] = Path("data/real/raw"),
+    folder: Annotated[Path, typer.Argument(help="Where clips and manifest go.")] = Path("data/raw/recorded"),
     camera: Annotated[
         list[str] | None,
         typer.Option(
@@ -90,7 +90,8 @@ def clips(
 
     if sheet is not None and sheet.suffix.lower() != ".png":
         raise AnyviewError(f"{sheet}: a contact sheet is a .png file")
-    found = survey(ingested_source() or load_params().real.source)
+    params = load_params()
+    found = survey(ingested_source() or params.real.source, params.split)
     print(json.dumps(found, indent=2) if as_json else "\n".join(lines(found)))
     if sheet is not None:
         _write_sheet(sheet)
@@ -101,7 +102,7 @@ def _write_sheet(path: Path) -> None:
     from anyview.video.pictures import contact_sheet, write_png
     from anyview.video.sets import open_frames
 
-    store = open_frames(Path("data/real/clips"))
+    store = open_frames(Path("data/clips/real"))
     labels = [f"{row.clip} {row.kind}" for row in store.manifest.itertuples()]
     write_png(path, contact_sheet(list(store.frames), labels))
 

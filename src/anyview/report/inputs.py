@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from anyview.config import Params
+from anyview.paths import REAL
 from anyview.runtime.errors import AnyviewError
 from anyview.video.files import read_video
 from anyview.video.manifests import read_table
@@ -133,25 +134,24 @@ class Study:
 
     def is_real(self, cell: str) -> bool:
         """Whether a translator cell was trained on the real clips, or on their surrogate."""
-        return self.params.translation.cells[cell].dataset == "real"
+        return self.params.translators[cell].dataset == REAL
 
 
 def read_study(data: Path, params: Params) -> Study:
     """Read the results below ``data``; AnyviewError names a broken file, or says that there is nothing."""
-    sets = _present(data / "sim", ("diverse", "narrow"))
-    clips = _present(data / "real", ("clips",))
-    splits = _present(data / "splits", ("sim-diverse", "sim-narrow", "real"), ".csv")
-    translators = [name for name, cell in params.translation.cells.items() if cell.method == "translator"]
-    models = _present(data / "models", translators)
-    translations = _present(data / "translations", translators)
-    policies = _present(data / "policies", params.imitation.cells)
+    sets = _present(data / "clips", params.simulate.sets)
+    clips = _present(data / "clips", [REAL])
+    splits = _present(data / "splits", params.split, ".csv")
+    models = _present(data / "models", params.translators)
+    translations = _present(data / "translations", params.translators)
+    policies = _present(data / "policies", params.methods)
     found = (sets, clips, splits, models, translations, policies)
     if not any(found):
         raise AnyviewError(f"{data}: nothing to report on yet; run `dvc repro`")
     return Study(
         params,
         {kind: _demonstrations(folder) for kind, folder in sets.items()},
-        _clips(clips["clips"]) if clips else None,
+        _clips(clips[REAL]) if clips else None,
         {name: read_split(path) for name, path in splits.items()},
         {cell: _training(folder) for cell, folder in models.items()},
         {cell: _translation(folder) for cell, folder in translations.items()},

@@ -101,7 +101,7 @@ def section(study: Study, data: Tree) -> Section:
 
 def _missing(study: Study) -> Iterator[str]:
     """Which declared methods have no results: a partial study says so."""
-    absent = [label(cell) for cell in in_order(study.params.imitation.cells) if cell not in study.evaluations]
+    absent = [label(cell) for cell in in_order(study.params.methods) if cell not in study.evaluations]
     if absent:
         yield f"Not run in this study: {listed(absent)}."
 
@@ -119,10 +119,10 @@ def _scale(study: Study) -> Iterator[tuple[str, str, str]]:
         stated = "{} train, {} validation and {} extreme".format(*thesis_counts)
         yield "Real clips" + (" (here: surrogate)" if study.surrogate else ""), stated, here
     if study.trainings:
-        sim = params.translation.cells.get("sim")
-        if sim is not None and sim.method == "translator":
+        sim = params.translators.get("sim")
+        if sim is not None:
             yield "Network of the sim translator", "sim", sim.architecture
-        yield "Frames in a batch", str(thesis.BATCH), str(params.translation.training.batch_size)
+        yield "Frames in a batch", str(thesis.BATCH), str(params.training.batch_size)
     lengths = {cell: int(training.curve["iteration"].max()) for cell, training in study.trainings.items()}
     for cell, reference in (("real-adam", thesis.ADAM), ("real-adadelta", thesis.ADADELTA), ("sim", None)):
         if cell in lengths:
@@ -136,7 +136,7 @@ def _scale(study: Study) -> Iterator[tuple[str, str, str]]:
     steps = imitation.iterations * imitation.episodes_per_iteration * ACTIONS
     yield "Iterations of a policy", str(thesis.POLICY_ITERATIONS), str(imitation.iterations)
     yield "Environment steps of a run", NOT_STATED, f"{steps:,}"
-    yield "Demonstrations averaged in a reward", NOT_STATED, str(imitation.reward.demonstrations)
+    yield "Demonstrations averaged in a reward", NOT_STATED, str(imitation.demonstrations)
     yield "Seed", "42", str(params.base.seed)
 
 

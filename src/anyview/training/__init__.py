@@ -1,1 +1,1 @@
-"""How networks are trained: one loop, what it minimises, batches, optimisation, augmentation."""
+"""How networks are trained: what each is trained for, and the loop that they share."""

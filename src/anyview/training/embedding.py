@@ -12,7 +12,7 @@ from anyview.embedding.network import Embedding
 from anyview.embedding.weights import save_embedding
 from anyview.runtime.device import products_in
 from anyview.seeds import stream, torch_seed
-from anyview.training.batches import FramePairs, training_triplets, validation_triplets
+from anyview.training.common.batches import FramePairs, training_triplets, validation_triplets
 from anyview.video.datasets import Dataset
 from anyview.video.pixels import to_input
 

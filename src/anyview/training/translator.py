@@ -10,8 +10,8 @@ from anyview.config import Training, TranslatorCell
 from anyview.runtime.device import products_in
 from anyview.seeds import stream, torch_seed
 from anyview.training.augmentation import Augmentation
-from anyview.training.batches import FramePairs, training_pairs, validation_pairs
-from anyview.training.optimization import MakeOptimizer
+from anyview.training.common.batches import FramePairs, training_pairs, validation_pairs
+from anyview.training.common.optimization import MakeOptimizer
 from anyview.translator.losses import NAMES, Losses, batch_losses
 from anyview.translator.network import ContextTranslator
 from anyview.translator.weights import save_translator

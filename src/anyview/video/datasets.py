@@ -7,16 +7,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from anyview import paths
 from anyview.runtime.errors import AnyviewError
 from anyview.video.sets import open_frames
 from anyview.video.splits import read_split
-
-# Where the pipeline keeps a data set: the folder of its clips, and its split table.
-DATASETS = {
-    "sim-diverse": (Path("data/sim/diverse"), Path("data/splits/sim-diverse.csv")),
-    "sim-narrow": (Path("data/sim/narrow"), Path("data/splits/sim-narrow.csv")),
-    "real": (Path("data/real/clips"), Path("data/splits/real.csv")),
-}
 
 
 @dataclass(frozen=True)
@@ -53,7 +47,7 @@ def open_dataset(name: str) -> Dataset:
     Raises AnyviewError if the split table does not fit the clips, leaves fewer than two clips to train on, or
     none to validate with.
     """
-    folder, table = DATASETS[name]
+    folder, table = paths.clip_set(name), paths.split_table(name)
     store = open_frames(folder)
     split = read_split(table)
     unknown = split["clip"][~split["clip"].isin(store.manifest["clip"])]
@@ -70,7 +64,7 @@ def open_dataset(name: str) -> Dataset:
 
 def dataset_files(name: str) -> list[Path]:
     """The small files that change whenever a data set does, to key what is made from it."""
-    folder, table = DATASETS[name]
+    folder, table = paths.clip_set(name), paths.split_table(name)
     return [folder / "manifest.csv", folder / "files.csv", table]
 
 

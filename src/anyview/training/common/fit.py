@@ -19,8 +19,8 @@ from anyview.runtime.errors import AnyviewError
 from anyview.runtime.outputs import whole_folder, write_atomically
 from anyview.runtime.progress import track
 from anyview.runtime.scratch import checkpoint_folder
-from anyview.training.batches import FramePairs
-from anyview.training.optimization import MakeOptimizer, SharedOptimizer, learning_rate
+from anyview.training.common.batches import FramePairs
+from anyview.training.common.optimization import MakeOptimizer, SharedOptimizer, learning_rate
 from anyview.video.datasets import dataset_files
 
 # The growing curve of a cell in training, for plots that follow it. It ends up in the cell's model folder.
@@ -183,7 +183,7 @@ def _keep_last_good(
     problem = (
         f"cell {name}: the loss diverged between iterations {rows[-1]['iteration'] if rows else 0} and "
         f"{row['iteration']} (training {row['loss']:.4g}, validation {row['validation_loss']:.4g}); "
-        "lower translation.training.learning_rate"
+        "lower training.learning_rate"
     )
     if not best:
         return problem
