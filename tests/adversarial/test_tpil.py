@@ -67,7 +67,7 @@ def test_a_step_is_judged_with_the_frame_three_steps_before():
     reward = make()
     clip = squares(random_motion(1, 9))[None]
     earned = show(reward, clip)[0, 0]
-    (network,) = reward._networks
+    (network,) = reward.networks
     for t in range(1, LAST + 1):
         pair = [to_input(clip[0, :, max(t - 3, 1)]), to_input(clip[0, :, t])]
         features = torch.cat([network.features(frame) for frame in pair], dim=1)

@@ -12,7 +12,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from anyview.assessment.evaluation import evaluate, evaluate_clip, translate_clip
 from anyview.assessment.importance import feature_weights
 from anyview.assessment.similarity import psnr, ssim
-from anyview.config import Evaluation
+from anyview.config import Assessment
 from anyview.translator.network import ContextTranslator
 from anyview.video.datasets import Dataset
 from anyview.video.files import read_video
@@ -97,7 +97,7 @@ def test_losses_of_a_clip_are_means_over_its_frames(model, views):
 
 
 def test_evaluation_writes_what_the_report_reads(model, views, tmp_path, monkeypatch):
-    params = Evaluation(clips=3, shown=2, permutations=4)
+    params = Assessment(clips=3, shown=2, permutations=4)
     outputs = {}
     for workers in ("1", "2"):
         monkeypatch.setenv("ANYVIEW_WORKERS", workers)

@@ -46,7 +46,7 @@ def test_reward_is_the_squared_distance_to_the_mean_embedding(model, expert_clip
     seen = np.stack([expert_clips[2:4, 7], expert_clips[3:5, 9]], axis=1)  # 2 runs, 2 copies
     target = model(to_input(expert_clips[:2, 7])).mean(0)
     away = ((model(to_input(seen)[0]) - target) ** 2).sum(-1)
-    expected = -((7 / 49) ** 2) * away.numpy() / reward.units[0]
+    expected = -((7 / 49) ** 2) * away.numpy() / reward.scales[0]
     np.testing.assert_allclose(reward.step(seen, 7)[0], expected, rtol=1e-4)
 
 

@@ -36,14 +36,14 @@ def _demonstrated(group: Group, cell: DemonstrationCell) -> Scoring:
     else:
         targets = translate_demonstrations(model, group.demonstrations, first)
     reward = DemonstrationReward(model, *targets, first, cell.weights, cell.time_power)
-    return Scoring(reward, reward.units, reward.targets(), judges=True)
+    return Scoring(reward, reward.scales, reward.targets(), fixed=True)
 
 
 def _embedded(group: Group, cell: EmbeddingRewardCell) -> Scoring:
     """The distance to the demonstrations in a time-contrastive embedding, which nothing translates."""
     model = _fitting(load_embedding(paths.model(cell.model)), cell.model, group.params.sim.image_size)
     reward = EmbeddingReward(model, group.demonstrations, group.own[:, 0], cell.time_power)
-    return Scoring(reward, reward.units, first_demonstration(group), judges=True)
+    return Scoring(reward, reward.scales, first_demonstration(group), fixed=True)
 
 
 def _fitting(model: Model, name: str, size: int) -> Model:
