@@ -28,8 +28,8 @@ _LEAK = 0.2
 class FrameDiscriminator(Discriminator):
     """D(o_t, t): three strided convolutions on the frame at half its size; time joins the connected layer.
 
-    Time comes as radial basis functions beside the number. From the number alone the discriminator learns many
-    times slower that the same frame is the expert's at one time and not at another.
+    Time comes as radial basis functions beside the number. From the number alone the discriminator learns
+    many times slower that the same frame is the expert's at one time and not at another.
     """
 
     def __init__(self, image_size: int):

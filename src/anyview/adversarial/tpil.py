@@ -2,9 +2,9 @@
 
 Features of a frame serve two heads: the class head tells expert from not, on a pair of frames; the domain
 head tells the expert's view from the agent's, on one frame, and its gradient is reversed on its way into the
-features. The view must not give the class away. So there is a third set, the "bystander": random motion in the
-expert's views. The paper's words for the three sets are expert, novice (here the agent) and random policy in
-the expert's domain (here the bystander).
+features. The view must not give the class away. So there is a third set, the "bystander": random motion in
+the expert's views. The paper's words for the three sets are expert, novice (here the agent) and random policy
+in the expert's domain (here the bystander).
 """
 
 from collections.abc import Mapping, Sequence

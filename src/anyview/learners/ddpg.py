@@ -75,7 +75,7 @@ def n_step_transitions(
 def minibatch_ages(
     rng: np.random.Generator, updates: int, batch_size: int, newest: int, size: int
 ) -> np.ndarray:
-    """Ages (updates, batch_size) of transitions: half of a batch among the ``newest``, half among ``size``."""
+    """Ages (updates, batch_size) of transitions: half of each batch below ``newest``, half below ``size``."""
     half = batch_size // 2
     late = rng.integers(newest, size=(updates, half))
     return np.hstack([late, rng.integers(size, size=(updates, batch_size - half))])
@@ -93,7 +93,7 @@ def critic_loss(critic: Network, inputs: Tensor, actions: Tensor, targets: Tenso
 
 
 def policy_loss(policy: Network, critic: Network, inputs: Tensor, penalty: float) -> Tensor:
-    """Minus the mean value of the policy's actions, plus ``penalty`` times the squared pre-activations (R, 1)."""
+    """``penalty`` times the squares of what enters tanh, minus the value of the actions: means (R, 1)."""
     before_tanh = policy(inputs)
     chosen = torch.cat([inputs, torch.tanh(before_tanh)], dim=-1)
     return (penalty * (before_tanh**2).sum(-1, keepdim=True) - critic(chosen)).mean(1)
@@ -173,8 +173,12 @@ class DDPG:
     def end_iteration(self) -> None:
         """Store the episodes; then take the iteration's updates."""
         params = self._params
-        episodes = [torch.stack(each) for each in zip(*self._episode, strict=True)]  # (T, R, C, ...)
-        transitions = n_step_transitions(*episodes, params.discount, params.n_step)
+        observations, actions, rewards, next_observations = (
+            torch.stack(each) for each in zip(*self._episode, strict=True)
+        )
+        transitions = n_step_transitions(
+            observations, actions, rewards, next_observations, params.discount, params.n_step
+        )
         rows = torch.cat(transitions, dim=-1).permute(1, 2, 0, 3)  # one episode after the other
         self._replay.add(rows.flatten(1, 2))
         self._iteration += 1
