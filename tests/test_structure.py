@@ -178,6 +178,9 @@ def test_an_edit_reruns_no_more_than_it_must():
         assert other not in {learners[name] for name in again}
     for reward in ("gail", "tpil"):
         assert rerun_by(f"src/anyview/adversarial/{reward}.py") == {f"discriminate@{reward}", "report"}
+    embedded = {name.split("@")[0] for name in rerun_by("src/anyview/training/embedding.py")}
+    assert embedded == {"embed", "imitate", "report"}
+    assert not {name for name in rerun_by("src/anyview/training/translator.py") if name.startswith("embed@")}
     assessed = rerun_by("src/anyview/assessment/similarity.py")
     assert {name.split("@")[0] for name in assessed} == {"translate", "report"}
     for folder in ("report", "analysis"):
