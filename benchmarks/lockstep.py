@@ -25,8 +25,8 @@ import torch
 from anyview.config import Params, load_params
 from anyview.environments.pusher import PusherEnv
 from anyview.environments.translated import TranslatedReward
-from anyview.evaluation.methods import Group, make_learner
 from anyview.evaluation.runs import groups_of
+from anyview.learners.ddpg import make_learner
 from anyview.pusher.batch import ACTION_SIZE, ACTIONS, OBSERVATION_SIZE, PusherBatch
 from anyview.pusher.contexts import Context, sample_contexts
 from anyview.pusher.expert import roll_out
@@ -84,10 +84,14 @@ def train_group(params: Params, runs: range, contexts: list[Context]) -> tuple[i
     """Train ``runs`` in lockstep for EPISODES episodes after one to warm up: steps, and seconds by part."""
     torch.set_num_threads(1)
     clips = make_clips(params, contexts)
-    group = Group(params, params.imitation.cells["ours"], runs, contexts, clips[:2], clips)
-    learner, model, first = make_learner(group), make_translator(params), np.ascontiguousarray(clips[:, 0])
+    cell = params.imitation.cells["ours"]
+    learner, model, first = (
+        make_learner(params, runs),
+        make_translator(params),
+        np.ascontiguousarray(clips[:, 0]),
+    )
     targets = translate_demonstrations(model, clips[:2], first)
-    reward = DemonstrationReward(model, *targets, first, params.imitation.reward)
+    reward = DemonstrationReward(model, *targets, first, cell.weights, cell.time_power)
     pushers, watch = PusherBatch(contexts, image_size=params.sim.image_size), Stopwatch()
     for method in ("_transitions", "_sample"):
         watch.follow(learner, method, "replay", within="updates")
@@ -129,7 +133,7 @@ def stable_baselines3_rate(params: Params, contexts: list[Context], threads: int
     torch.set_num_threads(threads)
     clips = make_clips(params, contexts[:2])
     pusher = PusherEnv(contexts[0], image_size=params.sim.image_size, render_mode="rgb_array")
-    env = TranslatedReward(pusher, make_translator(params), clips, params.imitation.reward)
+    env = TranslatedReward(pusher, make_translator(params), clips, params.imitation.cells["ours"].weights)
     wanted = params.imitation.ddpg
     model = DDPG(
         "MlpPolicy",

@@ -37,6 +37,8 @@ def main() -> None:
         print(f"skipped: {options.model} does not exist; run dvc repro first")
         return
     params = load_params()
+    weights = params.imitation.cells["ours"].weights
+    phi = weights.image / weights.feature
     contexts, _ = sample_contexts(stream(params.base.seed, "tuning"), options.contexts)
     positions, _ = roll_out(contexts)
     camera = renderer(params.sim.image_size)
@@ -51,7 +53,7 @@ def main() -> None:
     costs: dict[str, list[np.ndarray]] = {
         "L_f": [],
         "L_i": [],
-        f"L_f + {params.imitation.reward.phi:g} L_i": [],
+        f"L_f + {phi:g} L_i": [],
     }
     for run, context in enumerate(contexts):
         moved = np.repeat(positions[run, -1:], len(offsets), axis=0)
@@ -62,7 +64,6 @@ def main() -> None:
             feature = _squares(model.encode_expert(seen), features[run, -1])
             feature /= _squares(model.encode_expert(still), features[run]).mean()
         image = _squares(seen, images[run, -1]) / _squares(still, images[run]).mean()
-        phi = params.imitation.reward.phi
         for name, cost in zip(costs, (feature, image, (feature + phi * image) / (1 + phi)), strict=True):
             costs[name].append(cost.numpy())
 

@@ -58,8 +58,7 @@ def make_dataset(size: int) -> Dataset:
 
 def make_recipe(architecture: str, seed: int = 0) -> Recipe:
     cell = TranslatorCell(
-        method="translator",
-        dataset="sim-diverse",
+        dataset="diverse",
         architecture=architecture,
         optimizer="adam",
         iterations=1000,

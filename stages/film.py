@@ -1,10 +1,10 @@
 """Stage `film`: the surrogate webcam clips, as a camera would leave them."""
 
 import shutil
-from pathlib import Path
 
 import pandas as pd
 
+from anyview import paths
 from anyview.config import load_params
 from anyview.runtime.errors import AnyviewError, run_stage
 from anyview.runtime.outputs import whole_folder, write_atomically
@@ -13,8 +13,6 @@ from anyview.runtime.scratch import content_key, scratch_folder
 from anyview.runtime.workers import run_units
 from anyview.surrogate.film import film, plan
 from anyview.video.manifests import times_file
-
-OUTPUT = Path("data/real/surrogate")
 
 
 def main(arguments: list[str]) -> None:
@@ -31,7 +29,7 @@ def main(arguments: list[str]) -> None:
         for filmed in run_units(film, units):
             rows += filmed
             progress.advance()
-    with whole_folder(OUTPUT) as output:
+    with whole_folder(paths.raw("surrogate")) as output:
         for row in rows:
             for name in (row["file"], times_file(row["file"])):
                 shutil.copyfile(scratch / name, output / name)

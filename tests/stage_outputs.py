@@ -49,7 +49,7 @@ class Data:
         self.rng = np.random.default_rng(1)
 
     def demonstrations(self, kind: str, count: int = 40) -> None:
-        folder = self._folder("sim", kind)
+        folder = self._folder("clips", kind)
         clips = [f"{kind}-{index:04d}" for index in range(count)]
         shards = np.arange(count) // 20
         rows = {"clip": clips, "shard": shards, "position": np.arange(count) % 20}
@@ -61,7 +61,7 @@ class Data:
         self._json(folder / "summary.json", demos=count, expert_success=0.975, acceptance=0.4)
 
     def real_clips(self) -> None:
-        folder = self._folder("real", "clips")
+        folder = self._folder("clips", "real")
         clips = [f"clip-{index:03d}" for index in range(12)]
         self._csv(folder / "manifest.csv", clip=clips, file=[f"{clip}.avi" for clip in clips])
         self._csv(folder / "refused.csv", file=["dark.avi"], reason=["too dark"])
@@ -163,11 +163,10 @@ def whole_study(root: Path) -> None:
         data.demonstrations(kind)
     data.real_clips()
     cells = load_params(ROOT / "params.yaml")
-    for cell in cells.translation.cells:
-        if cell != "tcn":
-            data.translator(cell, extreme=cell.startswith("real"))
+    for cell in cells.translators:
+        data.translator(cell, extreme=cell.startswith("real"))
     distances = {"ours": 0.03, "oracle": 0.015, "tpil": 0.5, "gail": 0.45}
-    for index, cell in enumerate(cells.imitation.cells):
+    for index, cell in enumerate(cells.methods):
         learned = cell in ("tpil", "gail")
         data.policies(cell, distances.get(cell, 0.03 + 0.01 * index), returns=not learned, blind=learned)
 

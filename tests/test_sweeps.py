@@ -32,6 +32,9 @@ def cells(study: Study, **keys: str) -> set[str]:
     return {f"imitate@{name}" for name, cell in found.items() if keys.items() <= cell.items()}
 
 
+PHI = "imitation.cells.ours.weights.image"
+
+
 def reran(study: Study) -> set[str]:
     """Stages whose entry in dvc.lock is not the committed one."""
     review = json.loads(study.run("anyview", "review", "HEAD", "--json"))
@@ -42,18 +45,24 @@ def reran(study: Study) -> set[str]:
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "reads", "count"),
-    [("imitation.reward.phi", 7.0, "reward", 9), ("imitation.discriminator.steps", 7, "discriminator", 2)],
+    ("key", "value", "expected"),
+    [
+        (PHI, 7.0, {"imitate@ours"}),
+        ("adversarial.discriminator.steps", 7, {"discriminate@gail", "discriminate@tpil"}),
+        (
+            "imitation.trpo.step",
+            0.7,
+            {f"imitate@{name}" for name in ("ours-trpo", "liu")} | {"discriminate@gail", "discriminate@tpil"},
+        ),
+    ],
 )
-def test_a_number_of_a_reward_reruns_the_cells_that_read_it(study, key, value, reads, count):
+def test_a_number_reruns_the_cells_that_read_it(study, key, value, expected):
     """By `--dry`, which names the stages without running them."""
     path = study.folder / "params.yaml"
     before = path.read_text()
     change(study.folder, {key: value})
     said = study.run("dvc", "repro", "--dry").splitlines()
     path.write_text(before)
-    expected = cells(study, reads=reads)
-    assert len(expected) == count
     assert {line.split("'")[1] for line in said if line.startswith("Running stage")} == {
         "check",
         *expected,
@@ -62,13 +71,13 @@ def test_a_number_of_a_reward_reruns_the_cells_that_read_it(study, key, value, r
 
 
 def test_a_weight_of_a_loss_reruns_its_translator_and_what_follows(study):
-    key = "translation.cells.sim-no-alignment.weights.reconstruction"
+    key = "translators.sim-no-alignment.weights.reconstruction"
     study.run("dvc", "exp", "run", "-S", f"{key}=0.5")
     assert reran(study) == {
         "check",
         "train@sim-no-alignment",
         "translate@sim-no-alignment",
-        *cells(study, source="data/models/sim-no-alignment"),
+        *cells(study, model="sim-no-alignment"),
         "report",
     }
     metric = "translation.sim-no-alignment.validation.translation"
@@ -89,28 +98,28 @@ def work_off_the_queue(study: Study) -> str:
 
 
 def test_a_queue_of_the_whole_pipeline_runs_what_reads_phi(study):
-    study.run("dvc", "exp", "run", "--queue", "-S", "imitation.reward.phi=0.3")
+    study.run("dvc", "exp", "run", "--queue", "-S", f"{PHI}=0.3")
     assert work_off_the_queue(study).count("Success") == 1
-    told = json.loads(study.run("anyview", "sweep", "imitation.reward.phi", "--json"))
+    told = json.loads(study.run("anyview", "sweep", PHI, "--json"))
     (found,) = (trial["experiment"] for trial in told["trials"] if trial["value"] == 0.3)
     study.run("dvc", "exp", "apply", found)
-    assert reran(study) == {"check", *cells(study, reads="reward"), "report"}
+    assert reran(study) == {"check", "imitate@ours", "report"}
     study.run("git", "checkout", ".")
     study.run("dvc", "checkout")
     study.run("dvc", "queue", "remove", "--success")
 
 
 def test_a_queue_of_one_method_and_the_report(study):
-    command = ("dvc", "exp", "run", "--queue", "-S", "imitation.reward.phi=0.01,0.1,1")
+    command = ("dvc", "exp", "run", "--queue", "-S", f"{PHI}=0.01,0.1,1")
     study.run(*command, "--single-item", "imitate@ours", "report")
     status = work_off_the_queue(study)
     assert status.count("Success") == 3, status
-    told = json.loads(study.run("anyview", "sweep", "imitation.reward.phi", "--json"))
+    told = json.loads(study.run("anyview", "sweep", PHI, "--json"))
     found = {trial["value"]: trial["experiment"] for trial in told["trials"]}
     assert {0.01, 0.1, 1} <= found.keys()
     assert (study.folder / "sweep.svg").is_file()
     shown = study.run("dvc", "exp", "show", "--csv")
     assert all(found[value] in shown for value in (0.01, 0.1))
     study.run("dvc", "exp", "apply", found[0.01])
-    assert read_yaml(study.folder / "params.yaml")["imitation"]["reward"]["phi"] == 0.01
+    assert read_yaml(study.folder / "params.yaml")["imitation"]["cells"]["ours"]["weights"]["image"] == 0.01
     assert reran(study) == {"imitate@ours", "report"}

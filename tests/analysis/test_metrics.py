@@ -21,7 +21,7 @@ def bounded(*names: str) -> list[str]:
 
 @pytest.fixture(scope="module")
 def study(full, params):
-    return read_study(full / "data", params)
+    return read_study(params, full)
 
 
 @pytest.fixture(scope="module")
@@ -150,7 +150,7 @@ def test_only_cells_that_exist(data, params):
     data.translator("sim")
     data.policies("ours", 0.03)
     data.policies("oracle", 0.02)
-    trees = metrics(analyse(read_study(data.root / "data", params)))
+    trees = metrics(analyse(read_study(params, data.root)))
     assert trees["data"] == {}
     assert set(trees["translation"]) == {"sim"}
     assert set(trees["imitation"]) == {"ours", "oracle"}

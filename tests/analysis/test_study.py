@@ -8,7 +8,7 @@ from anyview.runtime.errors import AnyviewError
 
 def test_nothing_to_report_is_said(tmp_path, params):
     with pytest.raises(AnyviewError, match="nothing to report on yet"):
-        read_study(tmp_path / "data", params)
+        read_study(params, tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -29,4 +29,4 @@ def test_a_broken_input_is_named(data, params, file, content):
     data.policies("ours", 0.03)
     (data.root / "data" / file).write_text(content)
     with pytest.raises(AnyviewError, match=file.rsplit("/", 1)[1]):
-        read_study(data.root / "data", params)
+        read_study(params, data.root)

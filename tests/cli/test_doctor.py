@@ -3,8 +3,8 @@ from pathlib import Path
 
 import pytest
 
+from anyview.cli import doctor
 from anyview.cli.doctor import disk_needed, examine
-from anyview.cli.main import doctor
 from anyview.cli.profiles import apply_profile
 from anyview.config import load_params
 

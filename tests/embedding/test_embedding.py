@@ -22,7 +22,7 @@ from anyview.runtime.errors import AnyviewError
 from anyview.video.sets import write_clips, write_set
 from tests.training.discworld import clip_table
 
-CELL = EmbeddingCell(method="time-contrastive", dataset="sim-diverse", iterations=6, dimensions=8, margin=0.2)
+CELL = EmbeddingCell(dataset="diverse", iterations=6, dimensions=8, margin=0.2)
 TRAINING = Training(
     batch_size=40,
     learning_rate=0.001,
@@ -69,11 +69,11 @@ def clocks(tmp_path, monkeypatch) -> None:
         for t, frame in enumerate(clip):
             frame[15 - t :, left : left + 4] = rng.integers(200, 256)
     table = clip_table(["train"] * 100 + ["validation"] * 20)
-    folder = tmp_path / "data/sim/diverse"
+    folder = tmp_path / "data/clips/diverse"
     folder.mkdir(parents=True)
     write_set(folder, table[["clip"]], [write_clips(folder / "shard-0000.avi", clips, 10.0)])
     (tmp_path / "data/splits").mkdir()
-    table.to_csv(tmp_path / "data/splits/sim-diverse.csv", index=False)
+    table.to_csv(tmp_path / "data/splits/diverse.csv", index=False)
     monkeypatch.chdir(tmp_path)
 
 

@@ -160,7 +160,7 @@ def test_the_stage_takes_a_mixed_folder_and_one_bad_clip_stops_nothing(tmp_path,
         files = sorted((tmp_path / "data" / "real" / "clips").iterdir())
         outputs.append({path.name: path.read_bytes() for path in files})
     assert outputs[0] == outputs[1]
-    assert pd.read_csv(tmp_path / "data/real/clips/refused.csv")["file"].tolist() == ["bad.avi"]
+    assert pd.read_csv(tmp_path / "data/clips/real/refused.csv")["file"].tolist() == ["bad.avi"]
     split = pd.read_csv(tmp_path / "data/splits/real.csv")
     assert split["split"].value_counts().to_dict() == {"train": 2, "validation": 2}
     assert (split.groupby("pair")["split"].nunique() == 1).all()

@@ -84,7 +84,7 @@ def test_surrogate_clips_are_called_so(page):
 
 
 def test_the_page_says_what_it_was_made_from(page, whole):
-    for place in ("data/sim/diverse", "data/models/sim", "data/policies/ours"):
+    for place in ("data/clips/diverse", "data/models/sim", "data/policies/ours"):
         assert place in page.text
     assert "learning_rate: 0.001" in page.text
 

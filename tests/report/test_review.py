@@ -29,7 +29,7 @@ stages:
   simulate@diverse:
     cmd: python stages/simulate.py diverse
     outs:
-    - {path: data/sim/diverse, hash: md5, md5: ccc.dir, size: 1, nfiles: 1}
+    - {path: data/clips/diverse, hash: md5, md5: ccc.dir, size: 1, nfiles: 1}
 """
 
 

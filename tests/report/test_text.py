@@ -10,7 +10,7 @@ from anyview.report.text import environment, write_markdown
 
 
 def text_of(data, params) -> str:
-    study = read_study(data.root / "data", params)
+    study = read_study(params, data.root)
     text = write_markdown(study, analyse(study), Illustrations({}, {}, {}), lambda name: "")
     return text.replace("\u00a0", " ")
 

@@ -75,18 +75,18 @@ def test_validation_frames_are_fixed_and_use_every_clip(discs):
 
 
 def test_dataset_joins_clips_with_their_split(pipeline, discs):
-    dataset = open_dataset("sim-diverse")
+    dataset = open_dataset("diverse")
     assert np.array_equal(dataset.frames, discs.frames)
     assert np.array_equal(dataset.split("validation"), discs.split("validation"))
 
 
 def test_split_that_does_not_fit_the_clips_is_refused(pipeline):
-    path = pipeline / "data/splits/sim-diverse.csv"
+    path = pipeline / "data/splits/diverse.csv"
     table = pd.read_csv(path)
     table.loc[0, "clip"] = "stranger"
     table.to_csv(path, index=False)
     with pytest.raises(AnyviewError, match="stranger"):
-        open_dataset("sim-diverse")
+        open_dataset("diverse")
     table.assign(clip=[f"clip-{n:03d}" for n in range(320)], split="train").to_csv(path, index=False)
     with pytest.raises(AnyviewError, match="validation"):
-        open_dataset("sim-diverse")
+        open_dataset("diverse")

@@ -2,12 +2,21 @@
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
 from anyview import config
-from anyview.adversarial.discriminators import ClipSet, Discriminator, LearnedReward, Views, cross_entropy
+from anyview.adversarial.common.discriminators import (
+    ClipSet,
+    Discriminator,
+    LearnedReward,
+    Views,
+    cross_entropy,
+)
+from anyview.evaluation.demonstrations import training_clips
+from anyview.evaluation.methods import Group, Scoring, first_demonstration
 from anyview.learners.common.policies import with_time_bumps
 
 _CHANNELS = (16, 32, 32)
@@ -58,3 +67,13 @@ def gail_reward(
     size = experts[0].frames.shape[2]
     sets = [{"expert": clips} for clips in experts]
     return LearnedReward(lambda: FrameDiscriminator(size), params, seed, runs, sets, episodes)
+
+
+def make_reward(group: Group) -> Scoring:
+    """The reward of ``group`` against the training split's clips, each in a context of its own."""
+    frames, rows, _ = training_clips(group.params)
+    params, runs = group.params, group.runs
+    experts = [ClipSet(frames, rows)] * len(runs)
+    episodes = params.imitation.trpo.batch_episodes
+    reward = gail_reward(params.adversarial.discriminator, params.base.seed, runs, experts, episodes)
+    return Scoring(reward, np.ones(len(runs)), first_demonstration(group), judges=False)

@@ -14,13 +14,23 @@ import torch
 from torch import Tensor, nn
 
 from anyview import config
-from anyview.adversarial.discriminators import ClipSet, Discriminator, LearnedReward, Views, cross_entropy
+from anyview.adversarial.common.discriminators import (
+    ClipSet,
+    Discriminator,
+    LearnedReward,
+    Views,
+    cross_entropy,
+)
+from anyview.evaluation.demonstrations import training_clips
+from anyview.evaluation.methods import Group, Scoring, first_demonstration
 from anyview.pusher.batch import ACTION_SIZE, ACTIONS, PusherBatch
 from anyview.pusher.contexts import Context
+from anyview.seeds import stream
 
 _CHANNELS = 5
 _WIDTH = 128
 _LEAK = 0.2
+_BYSTANDERS = 100  # clips of random motion
 
 
 class ReverseGradient(torch.autograd.Function):
@@ -131,3 +141,18 @@ def random_motion(
         batch.step(std * rng.standard_normal((batch.count, ACTION_SIZE)))
         frames.append(batch.render())
     return np.stack(frames, axis=1)
+
+
+def make_reward(group: Group) -> Scoring:
+    """The reward of ``group`` against the same clips as GAIL, and random motion in the contexts of some."""
+    frames, rows, contexts = training_clips(group.params)
+    params, runs = group.params, group.runs
+    trpo, sim = params.imitation.trpo, params.sim
+    rng = stream(params.base.seed, "bystanders")
+    chosen = [contexts[index] for index in rng.permutation(len(contexts))[:_BYSTANDERS]]
+    motion = random_motion(chosen, rng, trpo.initial_std, sim.control, sim.image_size)
+    experts = [ClipSet(frames, rows)] * len(runs)
+    bystanders = [ClipSet(motion, np.arange(len(motion)))] * len(runs)
+    discriminator, seed = params.adversarial.discriminator, params.base.seed
+    reward = tpil_reward(discriminator, seed, runs, experts, bystanders, trpo.batch_episodes)
+    return Scoring(reward, np.ones(len(runs)), first_demonstration(group), judges=False)

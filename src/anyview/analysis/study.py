@@ -1,13 +1,14 @@
 """Outputs of the stages, read once and checked when they are read: tables as data frames, clips on demand."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from anyview import paths
 from anyview.config import Params
 from anyview.runtime.errors import AnyviewError
 from anyview.video.files import read_video
@@ -140,36 +141,35 @@ class Study:
 
     def is_real(self, cell: str) -> bool:
         """Whether a translator cell was trained on the real clips, or on their surrogate."""
-        return self.params.translation.cells[cell].dataset == "real"
+        return self.params.translators[cell].dataset == paths.REAL
 
 
-def read_study(data: Path, params: Params) -> Study:
-    """Read the results below ``data``; AnyviewError names a broken file, or says that there is nothing."""
-    sets = _present(data / "sim", ("diverse", "narrow"))
-    clips = _present(data / "real", ("clips",))
-    splits = _present(data / "splits", ("sim-diverse", "sim-narrow", "real"), ".csv")
-    translators = [name for name, cell in params.translation.cells.items() if cell.method == "translator"]
-    models = _present(data / "models", translators)
-    translations = _present(data / "translations", translators)
-    policies = _present(data / "policies", params.imitation.cells)
-    found = (sets, clips, splits, models, translations, policies)
-    if not any(found):
-        raise AnyviewError(f"{data}: nothing to report on yet; run `dvc repro`")
+def read_study(params: Params, root: Path = Path()) -> Study:
+    """Read the results below ``root``; AnyviewError names a broken file, or says that there is nothing."""
+
+    def present(place: Callable[[str], Path], names: Iterable[str]) -> dict[str, Path]:
+        found = {name: root / place(name) for name in names}
+        return {name: path for name, path in found.items() if path.exists()}
+
+    simulated = present(paths.clip_set, params.simulate.sets)
+    real = present(paths.clip_set, [paths.REAL])
+    splits = present(paths.split_table, params.split)
+    models = present(paths.model, params.translators)
+    translations = present(paths.translations, params.translators)
+    policies = present(paths.policies, params.methods)
+    groups = (simulated, real, splits, models, translations, policies)
+    if not any(groups):
+        raise AnyviewError(f"{root / paths.DATA}: nothing to report on yet; run `dvc repro`")
     return Study(
         params,
-        {kind: _simulated(folder) for kind, folder in sets.items()},
-        _real(clips["clips"]) if clips else None,
+        {name: _simulated(folder) for name, folder in simulated.items()},
+        _real(real[paths.REAL]) if real else None,
         {name: read_split(path) for name, path in splits.items()},
         {cell: _model(folder) for cell, folder in models.items()},
         {cell: _translator(folder) for cell, folder in translations.items()},
         {cell: _method(folder) for cell, folder in policies.items()},
-        tuple(path for group in found for path in group.values()),
+        tuple(path for group in groups for path in group.values()),
     )
-
-
-def _present(folder: Path, names: Iterable[str], suffix: str = "") -> dict[str, Path]:
-    paths = {name: folder / f"{name}{suffix}" for name in names}
-    return {name: path for name, path in paths.items() if path.exists()}
 
 
 def _simulated(folder: Path) -> SimulatedSet:

@@ -11,7 +11,7 @@ import torch
 
 from anyview.assessment.importance import feature_weights
 from anyview.assessment.similarity import psnr, ssim
-from anyview.config import Evaluation
+from anyview.config import Assessment
 from anyview.runtime.device import torch_device, use_threads, worker_count
 from anyview.runtime.progress import track
 from anyview.training.sampling import Dataset, clip_pairs
@@ -83,7 +83,7 @@ def evaluate(
     model: ContextTranslator,
     dataset: Dataset,
     folder: Path,
-    params: Evaluation,
+    params: Assessment,
     rng: np.random.Generator,
 ) -> None:
     """Fill ``folder`` with what the translator makes of its held-out clips.

@@ -3,15 +3,15 @@
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from anyview.report.review import MetricChange, compare
-from anyview.report.review_markdown import to_markdown
-from anyview.report.revisions import Revision, find_revision
 from anyview.runtime.errors import AnyviewError
 from anyview.runtime.outputs import write_atomically
+
+if TYPE_CHECKING:
+    from anyview.report.review import MetricChange
 
 OURS = ("imitation.ours.success_rate", "imitation.ours.final_distance_median")
 
@@ -35,6 +35,10 @@ def review(
 
     Prints Markdown, made to be pasted or posted into a pull request.
     """
+    from anyview.report.review import compare
+    from anyview.report.review_markdown import to_markdown
+    from anyview.report.revisions import Revision, find_revision
+
     root = Path()
     before = find_revision(root, revision)
     after = find_revision(root, to) if to else Revision(root)
@@ -96,5 +100,5 @@ def sweep(
     print(f"drawn: {output}")
 
 
-def _metric(change: MetricChange) -> dict[str, Any]:
+def _metric(change: "MetricChange") -> dict[str, Any]:
     return {**asdict(change), "beyond": change.beyond}

@@ -18,6 +18,7 @@ from safetensors.torch import load, save
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from anyview import paths
 from anyview.config import EmbeddingCell, Training
 from anyview.runtime.checkpoints import Checkpoints
 from anyview.runtime.device import computes_bfloat16, torch_device, use_threads
@@ -26,7 +27,7 @@ from anyview.runtime.outputs import whole_folder, write_atomically
 from anyview.runtime.progress import track
 from anyview.runtime.scratch import content_key, scratch_folder
 from anyview.seeds import stream, torch_seed
-from anyview.training.sampling import DATASETS, Dataset, clip_pairs, open_dataset
+from anyview.training.sampling import Dataset, clip_pairs, open_dataset
 from anyview.translator.network import to_input
 
 _CHANNELS = (16, 32, 64, 64)
@@ -203,7 +204,7 @@ def train_embedding(name: str, cell: EmbeddingCell, training: Training, seed: in
             if not (math.isfinite(loss) and math.isfinite(validation_loss)):
                 raise AnyviewError(
                     f"cell {name}: the loss diverged between iterations {done} and {stop}; lower "
-                    "translation.training.learning_rate"
+                    "training.learning_rate"
                 )
             measures = {"loss": loss, "validation_loss": validation_loss, "validation_time_error": error}
             rows.append({"iteration": stop} | measures)
@@ -216,7 +217,7 @@ def train_embedding(name: str, cell: EmbeddingCell, training: Training, seed: in
         meta = {
             "cell": name,
             "dataset": cell.dataset,
-            "method": cell.method,
+            "method": "time-contrastive",
             "iterations": cell.iterations,
             "best_iteration": run.best_iteration,
         }
@@ -227,7 +228,7 @@ def train_embedding(name: str, cell: EmbeddingCell, training: Training, seed: in
 
 
 def _key(name: str, cell: EmbeddingCell, training: Training, seed: int) -> str:
-    folder, split = DATASETS[cell.dataset]
+    folder, split = paths.clip_set(cell.dataset), paths.split_table(cell.dataset)
     values = [name, cell.model_dump(), training.model_dump(), seed]
     return content_key(values, [folder / "manifest.csv", folder / "files.csv", split])
 

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from anyview.config import Params
-from anyview.evaluation.methods import Group, Scoring, make_learner, make_reward
+from anyview.evaluation.methods import Group, Method, Scoring
 from anyview.learners.common.interfaces import Arrays, Learner, RewardSource
 from anyview.pusher.batch import ACTIONS, FRAMES, TOLERANCE, PusherBatch
 from anyview.pusher.contexts import Context
@@ -44,6 +44,7 @@ def groups_of(runs: int) -> list[range]:
 def evaluate_group(
     name: str,
     params: Params,
+    method: Method,
     runs: Sequence[int],
     contexts: Sequence[Context],
     demonstrations: np.ndarray,
@@ -56,8 +57,8 @@ def evaluate_group(
     use_threads(1)
     positions, _ = roll_out(contexts)
     own = _film(params, contexts, positions)
-    group = Group(params, params.imitation.cells[name], runs, contexts, demonstrations, own)
-    learner, scoring = make_learner(group), make_reward(group)
+    group = Group(params, params.methods[name], runs, contexts, demonstrations, own)
+    learner, scoring = method.make_learner(params, runs), method.make_reward(group)
     label = f"{name}, runs {runs[0]} to {runs[-1]}"
     curve = _train(label, group, learner, scoring, Checkpoints(scratch))
 

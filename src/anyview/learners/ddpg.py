@@ -26,6 +26,8 @@ from anyview.learners.common.noise import ornstein_uhlenbeck
 from anyview.learners.common.policies import with_time_bumps
 from anyview.learners.common.replay import Replay
 from anyview.learners.common.stacked import Adam, StackedMLP
+from anyview.pusher.batch import ACTION_SIZE, ACTIONS, OBSERVATION_SIZE
+from anyview.runtime.device import torch_device
 from anyview.seeds import stream
 
 
@@ -192,3 +194,19 @@ class DDPG:
             "critic_mean": self._critic_adam.mean,
             "critic_square": self._critic_adam.square,
         }
+
+
+def make_learner(params: config.Params, runs: Sequence[int]) -> DDPG:
+    """Untrained learners for ``runs`` of the pusher."""
+    imitation = params.imitation
+    return DDPG(
+        imitation.ddpg,
+        params.base.seed,
+        runs,
+        OBSERVATION_SIZE,
+        ACTION_SIZE,
+        horizon=ACTIONS,
+        copies=imitation.episodes_per_iteration,
+        iterations=imitation.iterations,
+        device=torch_device(),
+    )

@@ -17,6 +17,7 @@ from jinja2 import Environment
 from anyview.runtime.errors import AnyviewError
 
 Edges = dict[str, set[str]]
+Stop = str | tuple[str, str]
 
 _REFERENCE = re.compile(r"\$\{([\w.-]+)\}")
 
@@ -103,13 +104,24 @@ def _sorted(followers: Edges) -> list[str]:
         raise AnyviewError("dvc.yaml: its stages depend on each other in a circle") from None
 
 
-def layers(edges: Edges) -> list[list[str]]:
-    """Stages top to bottom, each right above its first follower: then few arrows pass behind a box."""
+def layers(edges: Edges) -> list[list[Stop]]:
+    """What stands beside each other, top to bottom: stages, and the edges that pass between them.
+
+    Each stage stands right above its first follower.
+    """
     above_end: dict[str, int] = {}
     for name in _sorted(edges):
         above_end[name] = 1 + max((above_end[follower] for follower in edges[name]), default=-1)
-    top = max(above_end.values(), default=-1)
-    return [[name for name in edges if above_end[name] == level] for level in range(top, -1, -1)]
+    arrows = [(maker, user) for maker in edges for user in sorted(edges[maker])]
+    order = {name: index for index, name in enumerate(edges)}
+    rows: list[list[Stop]] = []
+    for level in range(max(above_end.values(), default=-1), -1, -1):
+        stages = [name for name in edges if above_end[name] == level]
+        passing = [(maker, user) for maker, user in arrows if above_end[user] < level < above_end[maker]]
+        rows.append(
+            sorted([*stages, *passing], key=lambda stop: order[stop if isinstance(stop, str) else stop[1]])
+        )
+    return rows
 
 
 def draw(stages: list[Stage], templates: Environment) -> str:
@@ -117,15 +129,23 @@ def draw(stages: list[Stage], templates: Environment) -> str:
     shown = {stage.name: stage for stage in stages if stage.outputs}
     edges = needed_edges(list(shown.values()))
     rows = layers(edges)
-    places = {
-        name: (column - len(row) / 2, level)
-        for level, row in enumerate(rows)
-        for column, name in enumerate(row)
-    }
+    boxes: dict[str, tuple[float, int]] = {}
+    arrows: dict[tuple[str, str], list[tuple[float, int]]] = {}
+    for level, row in enumerate(rows):
+        for index, stop in enumerate(row):
+            place = (index - len(row) / 2, level)
+            if isinstance(stop, str):
+                boxes[stop] = place
+            else:
+                arrows.setdefault(stop, []).append(place)
     return templates.get_template("dag.svg.jinja").render(
         stages=shown,
-        places=places,
-        arrows=[(maker, user) for maker in shown for user in sorted(edges[maker])],
+        boxes=boxes,
+        arrows={
+            (maker, user): [boxes[maker], *arrows.get((maker, user), []), boxes[user]]
+            for maker in shown
+            for user in sorted(edges[maker])
+        },
         columns=max(len(row) for row in rows),
         rows=len(rows),
     )

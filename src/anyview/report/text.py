@@ -60,6 +60,7 @@ def write_markdown(
     text = environment(autoescape=False).get_template("report.md.jinja")
     written = text.render(
         study=study,
+        params=study.params,
         results=results,
         illustrations=illustrations,
         picture=picture,
@@ -72,23 +73,16 @@ def write_markdown(
 
 def _context(study: Study, results: Results) -> dict[str, Any]:
     """Tables as the templates read them, and which cells each chapter names."""
-    params = study.params
-    imitation = params.imitation
-    cells = params.translation.cells
+    imitation = study.params.imitation
     return {
         **{name: _by_cell(getattr(results, name)) for name in ("data", "translation", "imitation", "more")},
         **{
             name: list(getattr(results, name).itertuples())
             for name in ("loss_points", "optimizers", "weight_ranges", "differences", "effects")
         },
-        "real_cells": [cell for cell in cells if study.is_real(cell)],
+        "real_cells": [cell for cell in study.translators if study.is_real(cell)],
         "with_extreme": [cell for cell, entry in study.translators.items() if entry.filmed("extreme")],
-        "architectures": {
-            name: cell.architecture for name, cell in cells.items() if cell.method == "translator"
-        },
-        "training": params.translation.training,
-        "demonstrations": imitation.reward.demonstrations,
-        "missing": in_order(set(imitation.cells) - set(study.methods)),
+        "missing": in_order(set(study.params.methods) - set(study.methods)),
         "compared": compared(study.methods),
         "ablated": ablated(study.methods),
         "steps": imitation.iterations * imitation.episodes_per_iteration * ACTIONS,

@@ -4,7 +4,6 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from anyview import config
 from anyview.embedding.embedding import Embedding
 from anyview.learners.common.interfaces import Arrays
 from anyview.translator.network import to_input
@@ -19,14 +18,14 @@ class EmbeddingReward:
     """
 
     def __init__(
-        self, model: Embedding, demonstrations: np.ndarray, first_frames: np.ndarray, params: config.Reward
+        self, model: Embedding, demonstrations: np.ndarray, first_frames: np.ndarray, time_power: float
     ):
         """uint8 ``demonstrations`` (m, T + 1, H, W, 3) in any views, ``first_frames`` (R, H, W, 3)."""
         self._model = model
         self._device = next(model.parameters()).device
         self._targets = torch.stack([self._embed(clip[1:]) for clip in demonstrations]).mean(0)  # (T, D)
         steps = len(self._targets)
-        self._weights = (torch.arange(1, steps + 1, device=self._device) / steps) ** params.time_power
+        self._weights = (torch.arange(1, steps + 1, device=self._device) / steps) ** time_power
         still = ((self._embed(first_frames)[:, None] - self._targets) ** 2).sum(-1)
         self._units = (self._weights * still).mean(1).clamp_min(1e-6)
         self.units = self._units.cpu().numpy()

@@ -3,21 +3,14 @@
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from anyview import paths
 from anyview.runtime.errors import AnyviewError
 from anyview.video.sets import open_frames
 from anyview.video.splits import read_split
-
-# Where the pipeline keeps a dataset: the folder of its clips, and its split table.
-DATASETS = {
-    "sim-diverse": (Path("data/sim/diverse"), Path("data/splits/sim-diverse.csv")),
-    "sim-narrow": (Path("data/sim/narrow"), Path("data/splits/sim-narrow.csv")),
-    "real": (Path("data/real/clips"), Path("data/splits/real.csv")),
-}
 
 
 @dataclass(frozen=True)
@@ -72,18 +65,9 @@ class FramePairs:
         return dataset.frames[clips, times], dataset.frames[self.targets, 0]
 
 
-def check_dataset(cell: str, dataset: str, declared: list[str]) -> None:
-    """Refuse to go on where dvc.yaml says that ``cell`` depends on another dataset than params.yaml does."""
-    if declared and declared != [dataset]:
-        raise AnyviewError(
-            f"params.yaml: translation.cells.{cell}.dataset is {dataset}, but dvc.yaml makes the cell depend "
-            f"on {declared[0]}; change both"
-        )
-
-
 def open_dataset(name: str) -> Dataset:
     """Open one of the pipeline's datasets; clips that no split names are left with an empty split."""
-    folder, table = DATASETS[name]
+    folder, table = paths.clip_set(name), paths.split_table(name)
     store = open_frames(folder)
     split = read_split(table)
     unknown = split["clip"][~split["clip"].isin(store.manifest["clip"])]

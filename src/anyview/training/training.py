@@ -9,12 +9,13 @@ import pandas as pd
 import torch
 from torch import Tensor
 
+from anyview import paths
 from anyview.runtime.checkpoints import Checkpoints
 from anyview.runtime.errors import AnyviewError
 from anyview.runtime.outputs import whole_folder, write_atomically
 from anyview.runtime.progress import track
 from anyview.runtime.scratch import content_key, scratch_folder
-from anyview.training.sampling import DATASETS, open_dataset
+from anyview.training.sampling import open_dataset
 from anyview.training.trainer import Recipe, Trainer
 from anyview.translator import losses
 from anyview.translator.weights import save_translator
@@ -92,7 +93,7 @@ def _refuse_divergence(recipe: Recipe, run: Trainer, rows: list[Row], scratch: P
     before = rows[-2]["iteration"] if len(rows) > 1 else 0
     problem = (
         f"cell {recipe.name}: the loss diverged between iterations {before} and {newest['iteration']} "
-        f"(training {found[0]:.4g}, validation {found[1]:.4g}); lower translation.training.learning_rate"
+        f"(training {found[0]:.4g}, validation {found[1]:.4g}); lower training.learning_rate"
     )
     if run.best:
         kept = scratch / "last-good"
@@ -111,6 +112,7 @@ def _meta(recipe: Recipe, run: Trainer) -> dict[str, Any]:
 
 
 def _key(recipe: Recipe) -> str:
-    folder, split = DATASETS[recipe.cell.dataset]
+    dataset = recipe.cell.dataset
+    folder, split = paths.clip_set(dataset), paths.split_table(dataset)
     values = [recipe.name, recipe.cell.model_dump(), recipe.training.model_dump(), recipe.seed]
     return content_key(values, [folder / "manifest.csv", folder / "files.csv", split])

@@ -15,7 +15,7 @@ from tests.training.discworld import clip_table, disc_clips
 @pytest.fixture(scope="session")
 def discs() -> Dataset:
     """300 clips to train on and 20 held out."""
-    return Dataset("sim-diverse", disc_clips(320), clip_table(["train"] * 300 + ["validation"] * 20))
+    return Dataset("diverse", disc_clips(320), clip_table(["train"] * 300 + ["validation"] * 20))
 
 
 @pytest.fixture
@@ -33,8 +33,7 @@ def recipe() -> Callable[..., Recipe]:
             "validation_pairs": 12,
         }
         cell = {
-            "method": "translator",
-            "dataset": "sim-diverse",
+            "dataset": "diverse",
             "architecture": "compact",
             "optimizer": "adam",
             "iterations": 6,
@@ -49,12 +48,12 @@ def recipe() -> Callable[..., Recipe]:
 
 @pytest.fixture
 def pipeline(tmp_path, monkeypatch, discs) -> Path:
-    """A working folder in which the stages before have made data/sim/diverse and its split."""
-    folder = tmp_path / "data/sim/diverse"
+    """A working folder in which the stages before have made data/clips/diverse and its split."""
+    folder = tmp_path / "data/clips/diverse"
     folder.mkdir(parents=True)
     stored = [write_clips(folder / "shard-0000.avi", discs.frames, 10.0)]
     write_set(folder, discs.clips[["clip"]], stored)
     (tmp_path / "data/splits").mkdir()
-    discs.clips.to_csv(tmp_path / "data/splits/sim-diverse.csv", index=False)
+    discs.clips.to_csv(tmp_path / "data/splits/diverse.csv", index=False)
     monkeypatch.chdir(tmp_path)
     return tmp_path
