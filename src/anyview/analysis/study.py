@@ -1,15 +1,15 @@
-"""What the stages before left behind, read once: tables as data frames, checked when they are read."""
+"""Outputs of the stages, read once and checked when they are read: tables as data frames, clips on demand."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from anyview import paths
 from anyview.config import Params
-from anyview.paths import REAL
 from anyview.runtime.errors import AnyviewError
 from anyview.video.files import read_video
 from anyview.video.manifests import read_table
@@ -20,7 +20,7 @@ RETURNS = ("return_policy", "return_still", "return_arm_only", "return_expert")
 
 
 @dataclass(frozen=True)
-class Demonstrations:
+class SimulatedSet:
     """A simulated set: a row per demonstration, and the share of proposed contexts that were accepted."""
 
     folder: Path
@@ -42,7 +42,7 @@ class Demonstrations:
 
 
 @dataclass(frozen=True)
-class Clips:
+class RealClips:
     """How many real clips came through ingest, and how many were refused."""
 
     recorded: int
@@ -50,20 +50,16 @@ class Clips:
 
 
 @dataclass(frozen=True)
-class Training:
-    """A trained translator: ``curve`` has a row per validation."""
+class TrainedModel:
+    """A trained translator. ``curve`` has a row per validation: ``iteration, loss, validation_loss``."""
 
     curve: pd.DataFrame
     best_iteration: int
 
-    def losses(self, column: str) -> pd.Series:
-        """A column of the curve by iteration."""
-        return self.curve.set_index("iteration")[column]
-
 
 @dataclass(frozen=True)
-class Translation:
-    """A translator's evaluation: a row per clip (``clip, split`` and LOSSES), a weight per frame (T,)."""
+class AssessedTranslator:
+    """A translator on held-out clips: a row per clip (``clip, split``, LOSSES), a weight per frame (T,)."""
 
     folder: Path
     clips: pd.DataFrame
@@ -77,6 +73,12 @@ class Translation:
         """Clips of a split that were written out as video, in their order."""
         return [clip for clip in self.split(split)["clip"] if self._video(clip).exists()]
 
+    def typical(self, split: str) -> str:
+        """The clip of median loss among those of ``split`` that were written out as video."""
+        clips = self.split(split)
+        filmed = clips[clips["clip"].isin(self.filmed(split))].sort_values("loss", kind="stable")
+        return str(filmed["clip"].iloc[(len(filmed) - 1) // 2])
+
     def frames(self, clip: str) -> np.ndarray:
         """The clip's true frames with the translated ones to their right, uint8 RGB (T, H, 2 W, 3)."""
         return read_video(self._video(clip))
@@ -86,8 +88,8 @@ class Translation:
 
 
 @dataclass(frozen=True)
-class Evaluation:
-    """A method's evaluation: a row per run; a row per iteration and run; the clips that rewards average."""
+class EvaluatedMethod:
+    """A method: a row per run, a row per iteration and run, and the clips that it imitates."""
 
     folder: Path
     runs: pd.DataFrame
@@ -98,6 +100,11 @@ class Evaluation:
     def rollouts(self) -> list[int]:
         """Runs whose rollout was filmed."""
         return [int(run) for run in self.runs["run"] if self._video(int(run)).exists()]
+
+    @property
+    def median_run(self) -> int:
+        """The run of median final distance."""
+        return int(self.runs.sort_values("final_distance", kind="stable")["run"].iloc[len(self.runs) // 2])
 
     def rollout(self, run: int) -> np.ndarray:
         """The policy's frames with the imitated demonstration to their right, uint8 RGB (T, H, 2 W, 3)."""
@@ -119,12 +126,12 @@ class Study:
     """Everything a report is made from. Only what exists: a cell that was not run has no entry."""
 
     params: Params
-    demonstrations: dict[str, Demonstrations]
-    clips: Clips | None
+    simulated: dict[str, SimulatedSet]
+    real: RealClips | None
     splits: dict[str, pd.DataFrame]
-    trainings: dict[str, Training]
-    translations: dict[str, Translation]
-    evaluations: dict[str, Evaluation]
+    models: dict[str, TrainedModel]
+    translators: dict[str, AssessedTranslator]
+    methods: dict[str, EvaluatedMethod]
     sources: tuple[Path, ...]
 
     @property
@@ -134,63 +141,63 @@ class Study:
 
     def is_real(self, cell: str) -> bool:
         """Whether a translator cell was trained on the real clips, or on their surrogate."""
-        return self.params.translators[cell].dataset == REAL
+        return self.params.translators[cell].dataset == paths.REAL
 
 
-def read_study(data: Path, params: Params) -> Study:
-    """Read the results below ``data``; AnyviewError names a broken file, or says that there is nothing."""
-    sets = _present(data / "clips", params.simulate.sets)
-    clips = _present(data / "clips", [REAL])
-    splits = _present(data / "splits", params.split, ".csv")
-    models = _present(data / "models", params.translators)
-    translations = _present(data / "translations", params.translators)
-    policies = _present(data / "policies", params.methods)
-    found = (sets, clips, splits, models, translations, policies)
-    if not any(found):
-        raise AnyviewError(f"{data}: nothing to report on yet; run `dvc repro`")
+def read_study(params: Params, root: Path = Path()) -> Study:
+    """Read the results below ``root``; AnyviewError names a broken file, or says that there is nothing."""
+
+    def present(place: Callable[[str], Path], names: Iterable[str]) -> dict[str, Path]:
+        found = {name: root / place(name) for name in names}
+        return {name: path for name, path in found.items() if path.exists()}
+
+    simulated = present(paths.clip_set, params.simulate.sets)
+    real = present(paths.clip_set, [paths.REAL])
+    splits = present(paths.split_table, params.split)
+    models = present(paths.model, params.translators)
+    translations = present(paths.translations, params.translators)
+    policies = present(paths.policies, params.methods)
+    groups = (simulated, real, splits, models, translations, policies)
+    if not any(groups):
+        raise AnyviewError(f"{root / paths.DATA}: nothing to report on yet; run `dvc repro`")
     return Study(
         params,
-        {kind: _demonstrations(folder) for kind, folder in sets.items()},
-        _clips(clips[REAL]) if clips else None,
+        {name: _simulated(folder) for name, folder in simulated.items()},
+        _real(real[paths.REAL]) if real else None,
         {name: read_split(path) for name, path in splits.items()},
-        {cell: _training(folder) for cell, folder in models.items()},
-        {cell: _translation(folder) for cell, folder in translations.items()},
-        {cell: _evaluation(folder) for cell, folder in policies.items()},
-        tuple(path for group in found for path in group.values()),
+        {cell: _model(folder) for cell, folder in models.items()},
+        {cell: _translator(folder) for cell, folder in translations.items()},
+        {cell: _method(folder) for cell, folder in policies.items()},
+        tuple(path for group in groups for path in group.values()),
     )
 
 
-def _present(folder: Path, names: Iterable[str], suffix: str = "") -> dict[str, Path]:
-    paths = {name: folder / f"{name}{suffix}" for name in names}
-    return {name: path for name, path in paths.items() if path.exists()}
-
-
-def _demonstrations(folder: Path) -> Demonstrations:
+def _simulated(folder: Path) -> SimulatedSet:
     manifest = read_table(folder / "manifest.csv", ["clip", "shard", "position", "success"], unique="clip")
-    return Demonstrations(folder, manifest, float(_json(folder / "summary.json", "acceptance")["acceptance"]))
+    return SimulatedSet(folder, manifest, float(_json(folder / "summary.json", "acceptance")["acceptance"]))
 
 
-def _clips(folder: Path) -> Clips:
+def _real(folder: Path) -> RealClips:
     recorded, refused = (read_table(folder / f"{name}.csv", ["file"]) for name in ("manifest", "refused"))
-    return Clips(len(recorded), len(refused))
+    return RealClips(len(recorded), len(refused))
 
 
-def _training(folder: Path) -> Training:
+def _model(folder: Path) -> TrainedModel:
     curve = _numbers(folder / "curve.csv", ["iteration", "loss", "validation_loss"])
-    return Training(curve, int(_json(folder / "model.json", "best_iteration")["best_iteration"]))
+    return TrainedModel(curve, int(_json(folder / "model.json", "best_iteration")["best_iteration"]))
 
 
-def _translation(folder: Path) -> Translation:
+def _translator(folder: Path) -> AssessedTranslator:
     clips = read_table(folder / "clips.csv", ["clip", "split", *LOSSES], unique="clip")
     weights = _numbers(folder / "feature_weights.csv", ["frame", "weight"])
-    return Translation(folder, clips, weights["weight"].to_numpy())
+    return AssessedTranslator(folder, clips, weights["weight"].to_numpy())
 
 
-def _evaluation(folder: Path) -> Evaluation:
+def _method(folder: Path) -> EvaluatedMethod:
     runs = _numbers(folder / "runs.csv", ["run", "success", "final_distance"])
     curve = _numbers(folder / "curve.csv", ["iteration", "run", "final_distance", "return"])
     demonstrations = read_table(folder / "demonstrations.csv", ["clip"])["clip"]
-    return Evaluation(folder, runs.sort_values("run", ignore_index=True), curve, tuple(demonstrations))
+    return EvaluatedMethod(folder, runs.sort_values("run", ignore_index=True), curve, tuple(demonstrations))
 
 
 def _numbers(path: Path, columns: list[str]) -> pd.DataFrame:

@@ -1,9 +1,13 @@
 """Estimates with their 95% bounds, resampled from named streams, so that they repeat exactly."""
 
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 
+from anyview.analysis import thesis
 from anyview.analysis.statistics import bootstrap_interval, quantile_interval, resampled, wilson_interval
 from anyview.seeds import stream
 
@@ -82,6 +86,30 @@ class Estimator:
 def proportion(successes: int, trials: int) -> Estimate:
     """Successes of trials, with Wilson bounds."""
     return Estimate(successes / trials, *wilson_interval(successes, trials))
+
+
+def without_interval(value: float) -> Estimate:
+    """A count, or what a single training or clip gave; its bounds are NaN."""
+    return Estimate(value, math.nan, math.nan)
+
+
+def tidy(rows: Iterable[tuple[str, str, Estimate]]) -> pd.DataFrame:
+    """A row for each (cell, metric, estimate), with the thesis's value beside it.
+
+    Columns ``cell, metric, value, low, high, thesis, thesis_low, thesis_high``. The thesis's value is NaN
+    where it states none, its bounds are NaN but for success rates (Wilson).
+    """
+    stated = [(*key, without_interval(value)) for key, value in thesis.VALUES.items()]
+    stated += [
+        (cell, "success_rate", proportion(count, thesis.RUNS)) for cell, count in thesis.SUCCESSES.items()
+    ]
+    published = _estimates(stated, "thesis", "thesis_low", "thesis_high")
+    return _estimates(rows, "value", "low", "high").merge(published, on=["cell", "metric"], how="left")
+
+
+def _estimates(rows: Iterable[tuple[str, str, Estimate]], *names: str) -> pd.DataFrame:
+    records = [(cell, metric, found.value, found.low, found.high) for cell, metric, found in rows]
+    return pd.DataFrame(records, columns=["cell", "metric", *names]).astype(dict.fromkeys(names, float))
 
 
 def _sums(values: np.ndarray, groups: np.ndarray | None) -> np.ndarray:

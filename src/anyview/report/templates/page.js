@@ -1,8 +1,8 @@
-// Plays films in step: each film is one tall image of frames; the style sheet shows frame --frame of --count.
+// Plays clips in step: each is one tall image of frames; the style sheet shows frame --frame of --count.
 "use strict";
-for (const box of document.querySelectorAll(".reels")) {
-  const films = [...box.querySelectorAll(".film img")];
-  const reels = [...box.querySelectorAll(".reel")];
+for (const box of document.querySelectorAll(".player")) {
+  const clips = [...box.querySelectorAll(".clip img")];
+  const choices = [...box.querySelectorAll(".choice")];
   const [button, slider, choice] = ["button", "input", "select"].map((name) => box.querySelector(name));
   const count = Number(slider.max) + 1;
   let frame = 0;
@@ -11,8 +11,8 @@ for (const box of document.querySelectorAll(".reels")) {
   const show = (next) => {
     frame = next;
     slider.value = frame;
-    for (const film of films) {
-      film.style.setProperty("--frame", Math.min(frame, film.style.getPropertyValue("--count") - 1));
+    for (const clip of clips) {
+      clip.style.setProperty("--frame", Math.min(frame, clip.style.getPropertyValue("--count") - 1));
     }
   };
   // The last frame shows where things end: it stays for a second.
@@ -25,7 +25,7 @@ for (const box of document.querySelectorAll(".reels")) {
     timer = on ? setTimeout(tick, 160) : null;
     button.textContent = on ? "Pause" : "Play";
   };
-  const choose = () => reels.forEach((reel, index) => { reel.hidden = index !== Number(choice.value); });
+  const choose = () => choices.forEach((shown, index) => { shown.hidden = index !== Number(choice.value); });
 
   button.addEventListener("click", () => play(timer === null));
   slider.addEventListener("input", () => { play(false); show(Number(slider.value)); });

@@ -1,8 +1,9 @@
-"""The methods of `imitate` as the report speaks of them: labels, groups and order."""
+"""The cells that the analysis knows by name: labels, groups and order."""
 
 from collections.abc import Iterable
 
 OURS = "ours"
+ADAM, ADADELTA, AUGMENTED, SIM = "real-adam", "real-adadelta", "real-augmented", "sim"
 
 LABELS = {
     "ours": "Ours (DDPG, diverse)",

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from anyview.analysis.estimates import Estimator, proportion, tidy, without_interval
 from anyview.analysis.statistics import mcnemar_exact, wilson_interval
-from anyview.report.estimates import Estimator, proportion
 
 NORMAL_97_5 = 1.959963984540054
 
@@ -106,3 +106,21 @@ def test_a_single_run_has_no_spread():
     estimate = Estimator(1).median("x", np.array([0.25]))
     assert estimate.low == estimate.value == estimate.high == 0.25
     assert proportion(1, 1).low == pytest.approx(0.2065, abs=1e-4)
+
+
+def test_a_tidy_row_has_the_thesis_value_beside_it():
+    rows = [
+        ("ours", "success_rate", proportion(11, 15)),
+        ("real-adam", "validation.loss", without_interval(24_400)),
+        ("tcn", "success_rate", proportion(3, 15)),
+    ]
+    table = tidy(rows).set_index(["cell", "metric"])
+    ours, loss, tcn = (table.loc[row[:2]] for row in rows)
+    assert (ours["thesis"], round(ours["thesis_low"], 3), round(ours["thesis_high"], 3)) == (
+        0.8,
+        0.548,
+        0.930,
+    )
+    assert (loss["value"], loss["thesis"]) == (24_400, 4_232)
+    assert loss[["low", "high", "thesis_low", "thesis_high"]].isna().all()
+    assert np.isnan(tcn["thesis"])

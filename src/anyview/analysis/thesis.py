@@ -12,7 +12,7 @@ RUNS = 15
 
 @dataclass(frozen=True)
 class LossCurve:
-    """What the text says about one loss over training: values, and the iterations they stand at."""
+    """What the text says about one loss over training: values, and the iterations that they stand at."""
 
     start: float | None
     at_500: float
@@ -26,7 +26,7 @@ class LossCurve:
 
 
 @dataclass(frozen=True)
-class TrainingRun:
+class PublishedRun:
     """One of the two trainings on real clips."""
 
     total: LossCurve
@@ -35,10 +35,10 @@ class TrainingRun:
     hours: float
 
 
-ADAM = TrainingRun(LossCurve(47_564, 9_862, 3_214, 10_567), LossCurve(None, 9_624, 2_615, 11_242), 11_750, 8)
+ADAM = PublishedRun(LossCurve(47_564, 9_862, 3_214, 10_567), LossCurve(None, 9_624, 2_615, 11_242), 11_750, 8)
 """Figure 13: real clips, Adam, learning rate 0.001, on a GTX 970."""
 
-ADADELTA = TrainingRun(
+ADADELTA = PublishedRun(
     LossCurve(41_323, 26_469, 13_621, 6_102), LossCurve(38_212, 27_441, 12_232, 3_903), 6_320, 6
 )
 """Figure 14: the same with AdaDelta."""
@@ -47,19 +47,27 @@ FRAMES = 80
 FEATURE_WEIGHTS = ((0, 4, 0.016), (5, 29, 0.010), (30, 40, 0.025), (41, 48, 0.0), (60, 62, 0.008))
 """Figure 15 as (first frame, last frame, weight). Not every frame is stated; the sum is not 1: a shape."""
 
-STRIP_EXAMPLE_LOSS = 3_415
-VALIDATION_LOSS = 4_232
-LIU_VALIDATION_LOSS = round(VALIDATION_LOSS / (1 - 0.21))  # the text: 21% under Liu et al. (2018)
 VALIDATION_CLIPS = 21
-"""Figure 16: one example, and the mean over the validation clips."""
-
+VALIDATION_LOSS = 4_232
 EXTREME_LOSS = 11_562
-EXTREME_CLIPS = 10
-EXTREME_RATIO = EXTREME_LOSS / VALIDATION_LOSS
-"""Figure 17: the extreme distractor clips, and how many times the validation loss that is."""
 
-SIMULATION_LOSS = 2_302
-"""Figure 18: mean loss of the simulated validation clips."""
+VALUES = {
+    ("sim.diverse", "demos"): 4_000,
+    ("real", "train"): 122,
+    ("real", "validation"): VALIDATION_CLIPS,
+    ("real", "extreme"): 10,
+    ("real-adam", "iterations"): ADAM.iterations,
+    ("real-adam", "validation.example_loss"): 3_415,  # figure 16
+    ("real-adam", "validation.loss"): VALIDATION_LOSS,
+    ("real-adam", "extreme.loss"): EXTREME_LOSS,  # figure 17
+    ("real-adam", "extreme.ratio"): EXTREME_LOSS / VALIDATION_LOSS,
+    ("real-adadelta", "iterations"): ADADELTA.iterations,
+    ("sim", "validation.loss"): 2_302,  # figure 18, in another scene
+}
+"""What stands beside our value of a cell's metric, for all but the success rates."""
+
+LIU_VALIDATION_LOSS = round(VALIDATION_LOSS / (1 - 0.21))
+"""Figure 16: the thesis's loss is 21% under that of Liu et al. (2018)."""
 
 SUCCESSES = {
     "ours": 12,
@@ -76,13 +84,10 @@ SUCCESSES = {
 }
 """Figures 19 and 20, as successes of ``RUNS``: the rates are stated as percentages (12 of 15 as 80%)."""
 
-DEMONSTRATIONS = 4_000
-TRAIN_CLIPS = 122
-"""Data: simulated demonstrations, and real training clips."""
-
 BATCH = 100
 POLICY_ITERATIONS = 250
-"""Scale: frames in a batch of the translator's training, and iterations of a policy's."""
+SEED = 42
+"""Scale: frames in a batch of the translator's training, iterations of a policy's, seed."""
 
 
 def feature_weight_scale() -> float:
