@@ -34,7 +34,7 @@ from anyview.pusher.expert import roll_out
 from anyview.pusher.render import renderer
 from anyview.pusher.scene import SUBSTEPS, model
 from anyview.rewards.demonstration import DemonstrationReward, translate_demonstrations
-from anyview.runtime.workers import run_units
+from anyview.runtime.workers import run_tasks
 from anyview.translator.network import ContextTranslator
 
 import mujoco.batch  # isort: skip  (after anyview.pusher, which chooses the OpenGL backend)
@@ -120,8 +120,8 @@ def lockstep_rate(params: Params, contexts: list[Context]) -> float:
     """Steps per second of 15 runs in groups on two workers, setting up left out."""
     os.environ["ANYVIEW_WORKERS"] = "2"
     groups = groups_of(len(contexts))
-    units = [(params, group, [contexts[run] for run in group]) for group in groups]
-    return sum(steps / sum(watch.parts.values()) for steps, watch in run_units(train_group, units))
+    tasks = [(params, group, [contexts[run] for run in group]) for group in groups]
+    return sum(steps / sum(watch.parts.values()) for steps, watch in run_tasks(train_group, tasks))
 
 
 def stable_baselines3_rate(params: Params, contexts: list[Context], threads: int) -> float:

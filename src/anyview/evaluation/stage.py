@@ -17,7 +17,7 @@ from anyview.learners.common.policies import save_policies
 from anyview.pusher.contexts import sample_contexts
 from anyview.runtime.outputs import whole_folder, write_atomically
 from anyview.runtime.scratch import checkpoint_folder
-from anyview.runtime.workers import run_units
+from anyview.runtime.workers import run_tasks
 from anyview.seeds import stream
 from anyview.video.files import write_video
 
@@ -40,11 +40,11 @@ def evaluate_method(name: str, params: Params, method: Method, sources: Sequence
     groups = groups_of(len(contexts))
     values, files = _origin(name, params, sources)
     scratch = [checkpoint_folder([*values, index], files) for index in range(len(groups))]
-    units = [
+    tasks = [
         (name, params, method, group, [contexts[run] for run in group], demonstrations, folder)
         for group, folder in zip(groups, scratch, strict=True)
     ]
-    results = list(run_units(evaluate_group, units))
+    results = list(run_tasks(evaluate_group, tasks))
     runs = pd.concat([result.runs for result in results], ignore_index=True)
     curve = pd.concat([result.curve for result in results], ignore_index=True)
     with whole_folder(paths.policies(name)) as output:
