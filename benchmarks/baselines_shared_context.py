@@ -33,19 +33,16 @@ RUNS, BYSTANDERS, POINTS = 8, 10, 10
 def make_reward(method: str, params: Params, contexts: list[Context], clips: np.ndarray) -> LearnedReward:
     """The reward of ``method`` where run r's expert clip is ``clips[r]``, in the run's own context."""
     seed, imitation, runs = params.base.seed, params.imitation, range(len(contexts))
+    discriminator = params.adversarial.discriminator
     experts = [ClipSet(clips, np.array([run])) for run in runs]
     if method == "gail":
-        return gail_reward(
-            params.adversarial.discriminator, seed, runs, experts, imitation.trpo.batch_episodes
-        )
+        return gail_reward(discriminator, seed, runs, experts, imitation.trpo.batch_episodes)
     repeated = [context for context in contexts for _ in range(BYSTANDERS)]
     rng = stream(seed, "benchmark")
     motion = random_motion(repeated, rng, imitation.trpo.initial_std, params.sim.control, clips.shape[2])
     rows = np.arange(len(motion)).reshape(len(contexts), BYSTANDERS)
     bystanders = [ClipSet(motion, own) for own in rows]
-    return tpil_reward(
-        params.adversarial.discriminator, seed, runs, experts, bystanders, imitation.trpo.batch_episodes
-    )
+    return tpil_reward(discriminator, seed, runs, experts, bystanders, imitation.trpo.batch_episodes)
 
 
 def perform(pushers: PusherBatch, learner: TRPO, expert: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -37,6 +37,8 @@ def main() -> None:
         print(f"skipped: {options.model} does not exist; run dvc repro first")
         return
     params = load_params()
+    weights = params.imitation.cells["ours"].weights
+    phi = weights.image / weights.feature
     contexts, _ = sample_contexts(stream(params.base.seed, "tuning"), options.contexts)
     positions, _ = roll_out(contexts)
     camera = renderer(params.sim.image_size)

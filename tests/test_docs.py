@@ -10,9 +10,9 @@ import pytest
 import typer
 from dvc.cli import parse_args
 
-from anyview.cli.main import main as cli
+from anyview.cli.main import app
 from anyview.config import load_params
-from anyview.report.review import flat
+from anyview.review.results import flat
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = sorted(
@@ -164,7 +164,7 @@ def understood_by_dvc(arguments: list[str]) -> None:
 
 
 def understood_by_anyview(arguments: list[str]) -> None:
-    group = typer.main.get_command(cli.app)
+    group = typer.main.get_command(app)
     if not arguments or arguments[0].startswith("-"):
         return
     command = group.get_command(None, arguments[0])

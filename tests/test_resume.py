@@ -100,7 +100,7 @@ def test_changed_code_starts_afresh(study, begun):
     change(study.folder, stage.params)
     for number in (1, 2):
         process = begun("python", *stage.command)
-        while len(list(study.scratch.glob("checkpoints/*"))) < number:
+        while len(list(study.scratch.glob("checkpoints/*/"))) < number:
             assert process.poll() is None, process.communicate()
             time.sleep(0.02)
         if number == 1:

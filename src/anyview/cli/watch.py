@@ -2,14 +2,16 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from anyview.video.files import Codec
+from anyview import paths
 
-POLICIES = Path("data/policies")
-CODECS: dict[str, Codec] = {".mp4": "XVID", ".avi": "FFV1"}
+if TYPE_CHECKING:
+    from anyview.video.files import Codec
+
+CODECS: dict[str, "Codec"] = {".mp4": "XVID", ".avi": "FFV1"}
 
 
 def watch(
@@ -32,10 +34,11 @@ def watch(
         raise AnyviewError(f"{output}: the output must end in {' or '.join(CODECS)}")
     if size % 2:
         raise AnyviewError(f"--size {size}: must be even")
-    there = sorted(folder.name for folder in POLICIES.glob("*/"))
+    folder = paths.policies(cell)
+    there = sorted(each.name for each in folder.parent.glob("*/"))
     if cell not in there:
         raise AnyviewError(f"{cell}: no such method was evaluated; there are {', '.join(there) or 'none'}")
-    policy = load_policy(POLICIES / cell, run)
+    policy = load_policy(folder, run)
     pusher = PusherBatch([policy.context], policy.control, size)
     frames = film(pusher, lambda now: policy.act(now.observations[0])[None])[0]
     write_video(output, frames, 10.0, CODECS[output.suffix])

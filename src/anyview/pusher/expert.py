@@ -19,7 +19,8 @@ from anyview.pusher.scene import CONTROL_SECONDS
 def roll_out(contexts: Sequence[Context]) -> tuple[np.ndarray, np.ndarray]:
     """Run the expert in every context.
 
-    Returns positions (N, 50, 5) as ``Renderer`` takes them and final distances (N,) in metres.
+    Returns positions (N, 50, 5) as ``Renderer`` takes them and final distances (N,) in metres, rounded to 6
+    decimals.
     """
     batch = PusherBatch(contexts)
     batch.reset()
@@ -34,4 +35,4 @@ def roll_out(contexts: Sequence[Context]) -> tuple[np.ndarray, np.ndarray]:
         return error / CONTROL_SECONDS / MAX_TWIST
 
     positions = np.stack([batch.positions() for _ in episode(batch, act)], axis=1)
-    return positions, batch.distance()
+    return positions, batch.distance().round(6)

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import signal
 import socket
 import subprocess
@@ -19,6 +20,8 @@ import pytest
 from anyview.ingest.judge import read_clip
 from anyview.video.files import read_video
 from tests.ingest.raw_clips import LIMITS, pictures, write_raw
+
+ROOT = Path(__file__).parents[2]
 
 
 def command(*arguments: str, cwd: Path, **options) -> subprocess.Popen:
@@ -71,6 +74,22 @@ def test_two_views_are_filmed_at_once_and_ingest_takes_them(tmp_path, sources):
     )
     assert code == 2
     assert "pair p1 is there already" in err
+
+
+def test_json_tells_a_script_what_was_filmed(tmp_path, sources):
+    """And nothing else stands on standard output; a length that ingest refuses is noted beside it."""
+    shutil.copy(ROOT / "params.yaml", tmp_path)
+    arguments = ("--delay", "0.1", "--seconds", "1", "--camera", f"left={sources / 'a.mp4'}")
+    code, out, err = run("record", "raw", "--json", *arguments, cwd=tmp_path)
+    assert code == 0
+    assert json.loads(out) == {
+        "folder": "raw",
+        "pair": "demo-001",
+        "kind": "standard",
+        "clips": [{"camera": "left", "file": "demo-001-left.avi", "still": "demo-001-left.png"}],
+    }
+    assert {path.name for path in (tmp_path / "raw").iterdir()} >= {"demo-001-left.avi", "demo-001-left.png"}
+    assert "note: stage ingest takes clips of" in err
 
 
 def test_a_clip_that_a_kill_kept_out_of_the_manifest_is_in_nobodys_way(tmp_path, sources):
