@@ -1,6 +1,7 @@
 """The metrics that Git tracks: exact keys, true values, nothing but finite rounded numbers."""
 
 import json
+import shutil
 
 import numpy as np
 import pandas as pd
@@ -11,6 +12,7 @@ from anyview.analysis.metrics import details, metrics, write_metrics
 from anyview.analysis.results import analyse
 from anyview.analysis.study import read_study
 from anyview.runtime.errors import AnyviewError
+from tests.review.commands import run
 
 LOSSES = ("loss", "translation", "reconstruction", "alignment", "psnr", "ssim")
 
@@ -108,6 +110,24 @@ def test_the_summary_fits_a_screen_and_agrees_with_the_details(trees, study):
         "real_validation": 4,
         "real_extreme": 2,
     }
+
+
+def test_dvc_shows_a_screenful_when_every_metric_changed(trees, tmp_path, root):
+    """By the real `dvc metrics diff`, on the repository's own pipeline."""
+    for name in ("dvc.yaml", "params.yaml"):
+        shutil.copy(root / name, tmp_path)
+    (tmp_path / "metrics").mkdir()
+    write_metrics(tmp_path / "metrics", trees)
+    for command in ("git init -q", "dvc init -q", "git add -A", "git commit -qm start"):
+        run(tmp_path, *command.split())
+    changed = {
+        group: {cell: value + 1 for cell, value in cells.items()} for group, cells in trees["summary"].items()
+    }
+    (tmp_path / "metrics" / "summary.json").write_text(json.dumps(changed))
+    lines = run(tmp_path, "dvc", "metrics", "diff").splitlines()
+    rows = [line for line in lines if line.startswith("metrics/summary.json")]
+    assert len(rows) == sum(map(len, changed.values()))
+    assert len(lines) <= 60
 
 
 def test_a_change_below_the_last_digit_does_not_show_in_the_summary(trees, study):
