@@ -12,7 +12,7 @@ from dvc.cli import parse_args
 
 from anyview.cli.main import app
 from anyview.config import load_params
-from anyview.report.review import flat
+from anyview.review.results import flat
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = sorted(

@@ -12,6 +12,8 @@ from tests.long_stages import change
 
 pytestmark = pytest.mark.slow
 
+PHI = "imitation.cells.ours.weights.image"
+
 
 @pytest.fixture(scope="module")
 def study(smoke, tmp_path_factory) -> Study:
@@ -30,9 +32,6 @@ def cells(study: Study, **keys: str) -> set[str]:
     """Stages of the imitation cells that have these keys in params.yaml."""
     found = read_yaml(study.folder / "params.yaml")["imitation"]["cells"]
     return {f"imitate@{name}" for name, cell in found.items() if keys.items() <= cell.items()}
-
-
-PHI = "imitation.cells.ours.weights.image"
 
 
 def reran(study: Study) -> set[str]:
@@ -82,7 +81,7 @@ def test_a_weight_of_a_loss_reruns_its_translator_and_what_follows(study):
     }
     metric = "translation.sim-no-alignment.validation.translation"
     told = json.loads(study.run("anyview", "sweep", key, "--metric", metric, "--json"))
-    assert [trial["value"] for trial in told["trials"]] == [0.5, 1.0]
+    assert [experiment["value"] for experiment in told["experiments"]] == [0.5, 1.0]
     study.run("git", "checkout", ".")
     study.run("dvc", "checkout")
 
@@ -101,7 +100,7 @@ def test_a_queue_of_the_whole_pipeline_runs_what_reads_phi(study):
     study.run("dvc", "exp", "run", "--queue", "-S", f"{PHI}=0.3")
     assert work_off_the_queue(study).count("Success") == 1
     told = json.loads(study.run("anyview", "sweep", PHI, "--json"))
-    (found,) = (trial["experiment"] for trial in told["trials"] if trial["value"] == 0.3)
+    (found,) = (experiment["name"] for experiment in told["experiments"] if experiment["value"] == 0.3)
     study.run("dvc", "exp", "apply", found)
     assert reran(study) == {"check", "imitate@ours", "report"}
     study.run("git", "checkout", ".")
@@ -115,7 +114,7 @@ def test_a_queue_of_one_method_and_the_report(study):
     status = work_off_the_queue(study)
     assert status.count("Success") == 3, status
     told = json.loads(study.run("anyview", "sweep", PHI, "--json"))
-    found = {trial["value"]: trial["experiment"] for trial in told["trials"]}
+    found = {experiment["value"]: experiment["name"] for experiment in told["experiments"]}
     assert {0.01, 0.1, 1} <= found.keys()
     assert (study.folder / "sweep.svg").is_file()
     shown = study.run("dvc", "exp", "show", "--csv")

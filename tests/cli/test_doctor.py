@@ -36,6 +36,15 @@ def test_what_is_missing_comes_with_advice(here, quick):
     }
 
 
+def test_a_path_in_which_dvcs_queue_fails_is_found(here, quick, monkeypatch):
+    (here / ".dvc").mkdir()
+    (here / ".dvc/config").touch()
+    assert "dvc" not in advice()
+    clone = here.rename(here.with_name("überblick"))
+    monkeypatch.chdir(clone)
+    assert "queue" in advice()["dvc"]
+
+
 def test_room_is_measured_against_the_params(here, quick, monkeypatch):
     usage = shutil.disk_usage(here)
     monkeypatch.setattr(shutil, "disk_usage", lambda folder: usage._replace(free=2_000_000_000))

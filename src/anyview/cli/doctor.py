@@ -93,6 +93,9 @@ def _dvc() -> Check:
         return Check("dvc", "not installed", "run `make setup`")
     if not Path(".dvc/config").is_file():
         return Check("dvc", f"{version}, no repository here", "run from the root of a clone of Anyview")
+    if not str(Path.cwd()).isascii():
+        advice = "move the clone to a path of ASCII letters: DVC's queue fails here (all else works)"
+        return Check("dvc", f"{version}, in a path with letters outside ASCII", advice)
     return Check("dvc", version)
 
 

@@ -18,7 +18,8 @@ from anyview.pusher.scene import CONTROL_SECONDS
 def roll_out(contexts: Sequence[Context]) -> tuple[np.ndarray, np.ndarray]:
     """Run the expert in every context.
 
-    Returns positions (N, 50, 5) as ``Renderer`` takes them and final distances (N,) in metres.
+    Returns positions (N, 50, 5) as ``Renderer`` takes them and final distances (N,) in metres, rounded to 6
+    decimals.
     """
     batch = PusherBatch(contexts)
     batch.reset()
@@ -33,4 +34,4 @@ def roll_out(contexts: Sequence[Context]) -> tuple[np.ndarray, np.ndarray]:
         error[:, 2] = wrap(error[:, 2])
         batch.step(error / CONTROL_SECONDS / MAX_TWIST)
         positions[:, t + 1] = batch.positions()
-    return positions, batch.distance()
+    return positions, batch.distance().round(6)

@@ -1,105 +1,86 @@
 """`anyview sweep` on real experiments of `dvc exp` in a small project of its own."""
 
 import json
-import os
-import subprocess
-import sys
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import pytest
 
-from anyview.report.figures.sweep import sweep as draw
-from anyview.report.review import Reading
-from anyview.report.sweeps import Sweep, Trial, read_sweep
+from anyview.review.results import Measurement
+from anyview.review.sweep_figure import sweep as draw
+from anyview.review.sweeps import Experiment, Sweep, read_sweep
 from anyview.runtime.errors import AnyviewError
+from tests.review.commands import run
 
 PIPELINE = """stages:
   measure:
     cmd: python measure.py
     params: [imitation, base]
-    metrics:
+    outs:
       - metrics/imitation.json: {cache: false}
 """
 MEASURE = """import json, pathlib, re
 text = open("params.yaml").read()
-phi, seed = (float(re.search(name + r": ([\\d.]+)", text)[1]) for name in ("phi", "seed"))
-values = {"success_rate": phi / 2, "success_rate_low": phi / 4, "success_rate_high": phi}
+discount, seed = (float(re.search(name + r": ([\\d.]+)", text)[1]) for name in ("discount", "seed"))
+values = {"success_rate": discount / 2, "success_rate_low": discount / 4, "success_rate_high": discount}
 distance = {"final_distance_median": 0.1 * seed}
 pathlib.Path("metrics").mkdir(exist_ok=True)
 pathlib.Path("metrics/imitation.json").write_text(json.dumps({"ours": values | distance}))
 """
-PARAMS = "base: {seed: 1}\nimitation:\n  reward: {phi: 0.3}\n"
-
-
-def run(folder: Path, *command: str) -> subprocess.CompletedProcess[str]:
-    path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
-    done = subprocess.run(
-        command,
-        cwd=folder,
-        env=os.environ | {"PATH": path, "DVC_NO_ANALYTICS": "1"},
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
-    return done
+PARAMS = "base: {seed: 1}\nimitation:\n  ddpg: {discount: 0.3}\n"
 
 
 @pytest.fixture(scope="module")
 def project(tmp_path_factory) -> Path:
-    """Three experiments: two that vary phi, one that varies phi and the seed."""
+    """Three experiments: two that vary discount, one that varies discount and the seed."""
     folder = tmp_path_factory.mktemp("sweep")
     for name, content in (("dvc.yaml", PIPELINE), ("measure.py", MEASURE), ("params.yaml", PARAMS)):
         (folder / name).write_text(content)
     run(folder, "git", "init", "-q", "-b", "main")
-    for key, value in (("user.name", "A"), ("user.email", "a@example.org"), ("core.hooksPath", "/dev/null")):
-        run(folder, "git", "config", key, value)
     run(folder, "dvc", "init", "-q")
     run(folder, "dvc", "repro", "-q")
     run(folder, "git", "add", "-A")
     run(folder, "git", "commit", "-qm", "start")
-    phi = "imitation.reward.phi"
-    for settings in ([f"{phi}=1"], [f"{phi}=0.01"], [f"{phi}=0.1", "base.seed=2"]):
+    discount = "imitation.ddpg.discount"
+    for settings in ([f"{discount}=1"], [f"{discount}=0.01"], [f"{discount}=0.1", "base.seed=2"]):
         run(folder, "dvc", "exp", "run", "-q", *(part for each in settings for part in ("-S", each)))
     run(folder, "git", "checkout", "-q", ".")
     return folder
 
 
 def test_a_sweep_holds_the_experiments_that_vary_its_key_alone(project):
-    sweep = read_sweep("imitation.reward.phi", ["imitation.ours.success_rate"], project)
-    assert sweep.values() == [0.01, 0.3, 1]
-    assert [trial.name == sweep.base for trial in sweep.trials] == [False, True, False]
-    assert sweep.trials[2].metrics["imitation.ours.success_rate"] == Reading(0.5, 0.25, 1)
+    sweep = read_sweep("imitation.ddpg.discount", ["imitation.ours.success_rate"], project)
+    assert [experiment.value for experiment in sweep.experiments] == [0.01, 0.3, 1]
+    assert [experiment.name == sweep.base for experiment in sweep.experiments] == [False, True, False]
+    assert sweep.experiments[2].metrics["imitation.ours.success_rate"] == Measurement(0.5, 0.25, 1)
     assert sweep.left_out == 1
 
 
 def test_the_command_prints_and_draws(project):
-    printed = run(project, "anyview", "sweep", "imitation.reward.phi").stdout.splitlines()
+    printed = run(project, "anyview", "sweep", "imitation.ddpg.discount").splitlines()
     assert printed[0].split()[1:] == [
-        "imitation.reward.phi",
+        "imitation.ddpg.discount",
         "imitation.ours.success_rate",
         "imitation.ours.final_distance_median",
     ]
     assert [line.split()[1] for line in printed[1:4]] == ["0.01", "0.3", "1"]
     assert printed[4:] == [
-        "left out: 1 that vary something else too, or have no such metrics yet",
+        "left out: 1 that vary something else too, or have no such metrics",
         "drawn: sweep.svg",
     ]
     ElementTree.parse(project / "sweep.svg")
-    told = json.loads(
-        run(project, "anyview", "sweep", "imitation.reward.phi", "--json", "-o", "a.png").stdout
-    )
-    assert [trial["value"] for trial in told["trials"]] == [0.01, 0.3, 1]
+    told = json.loads(run(project, "anyview", "sweep", "imitation.ddpg.discount", "--json", "-o", "a.png"))
+    assert [experiment["value"] for experiment in told["experiments"]] == [0.01, 0.3, 1]
     assert plt.imread(project / "a.png").shape[2] == 4
 
 
 @pytest.mark.parametrize(
     ("key", "metric", "complaint"),
     [
-        ("imitation.reward.phy", "imitation.ours.success_rate", "no such key in params.yaml"),
+        ("imitation.ddpg.discuont", "imitation.ours.success_rate", "no such key in params.yaml"),
         ("base.seed", "imitation.ours.success_rate", "no finished experiment of this commit varies it alone"),
-        ("imitation.reward.phi", "imitation.ours.sucess", "has imitation.ours.sucess"),
+        ("imitation.ddpg.discount", "imitation.ours.sucess", "has imitation.ours.sucess"),
     ],
 )
 def test_what_cannot_be_drawn_is_told(project, key, metric, complaint):
@@ -108,7 +89,7 @@ def test_what_cannot_be_drawn_is_told(project, key, metric, complaint):
 
 
 def test_outside_of_a_project(tmp_path):
-    with pytest.raises(AnyviewError, match="dvc exp show: "):
+    with pytest.raises(AnyviewError, match="not inside a Git repository"):
         read_sweep("base.seed", ["imitation.ours.success_rate"], tmp_path)
 
 
@@ -116,19 +97,24 @@ def test_outside_of_a_project(tmp_path):
     ("values", "scale"),
     [
         ([0.0, 0.5, 1.0], "linear"),
-        ([0.01, 0.1, 1.0], "log"),
+        ([0.01, 0.1, 1.0], "symlog"),
         ([0.0, 0.01, 1.0], "symlog"),
-        ([-1.0, 0.01, 1.0], "linear"),
+        ([-1.0, 0.01, 1.0], "symlog"),
         (["adam", "adadelta"], "linear"),
     ],
 )
 def test_every_value_is_a_tick_on_a_fitting_axis(values, scale):
     name = "imitation.ours.final_distance_median"
-    trials = tuple(Trial(str(at), {"key": at}, {name: Reading(0.05, 0.03, 0.08)}) for at in values)
-    figure = draw(Sweep("key", (name,), "", trials, 0))
+    found = {name: Measurement(0.05, 0.03, 0.08)}
+    experiments = tuple(Experiment(str(value), value, found) for value in values)
+    figure = draw(Sweep("key", (name,), "", experiments, 0))
     (axis,) = figure.axes
     assert axis.get_xscale() == scale
     shown = [text.get_text() for text in axis.get_xticklabels()]
     assert shown == [f"{value:g}" if isinstance(value, float) else value for value in values]
+    ticks = axis.transData.transform([(tick, 0) for tick in axis.get_xticks()])
+    across = axis.transAxes.inverted().transform(ticks)[:, 0]
+    assert across.min() < 0.1  # the points take up the whole panel
+    assert across.max() > 0.9
     assert axis.get_ylabel() == "final distance, median (cm)"
     assert axis.get_ylim()[0] < 3 < 8 < axis.get_ylim()[1]

@@ -1,4 +1,4 @@
-"""Files as they stand at a Git revision or in the working tree."""
+"""Files as they stand at a Git revision, in an experiment of DVC or in the working tree."""
 
 import subprocess
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from anyview.runtime.errors import AnyviewError
 
 @dataclass(frozen=True)
 class Revision:
-    """One state of the project at ``root``: the commit ``sha``, or the working tree where it is None."""
+    """One state of the project at ``root``: the commit ``sha``, or the working tree if it is None."""
 
     root: Path
     sha: str | None = None
@@ -20,7 +20,7 @@ class Revision:
         return self.sha[:10] if self.sha else "working tree"
 
     def read(self, path: str) -> bytes | None:
-        """The content of ``path``, relative to ``root``; None where this state has no such file."""
+        """The content of ``path``, relative to ``root``; None if this state has no such file."""
         if self.sha is None:
             file = self.root / path
             return file.read_bytes() if file.is_file() else None
@@ -36,6 +36,16 @@ class Revision:
             return sorted(entry.relative_to(self.root).as_posix() for entry in files)
         listing = _git(self.root, "ls-tree", "-r", "-z", "--name-only", self.sha, "--", path)
         return sorted(listing.decode().split("\0")[:-1])
+
+    def experiments(self) -> dict[str, "Revision"]:
+        """The finished experiments of `dvc exp` that started from this commit, by name.
+
+        DVC keeps each as a commit at ``refs/exps/<first two digits>/<the others>/<name>``.
+        """
+        place = f"refs/exps/{self.sha[:2]}/{self.sha[2:]}/" if self.sha else ""
+        listing = _git(self.root, "for-each-ref", "--format=%(objectname) %(refname:lstrip=4)", place)
+        entries = (line.split(" ", 1) for line in listing.decode().splitlines())
+        return {name: Revision(self.root, sha) for sha, name in entries}
 
 
 def find_revision(root: Path, revision: str) -> Revision:

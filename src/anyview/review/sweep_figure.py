@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from anyview.report.figures.style import BLUE, QUIET, canvas
-from anyview.report.sweeps import Sweep
+from anyview.review.sweeps import Sweep, is_number
 
 _WORDS = {
     "success_rate": ("runs that succeed (%)", 100),
@@ -17,15 +17,15 @@ _WIDE = 20  # largest value over smallest from which an axis is logarithmic
 
 
 def sweep(content: Sweep) -> Figure:
-    """A panel a metric, one under another; the open marker is the commit that the experiments started at."""
-    values = content.values()
-    numeric = all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
+    """One panel for each metric. The open marker is the commit that the experiments started from."""
+    values = [experiment.value for experiment in content.experiments]
+    numeric = all(map(is_number, values))
     places = np.asarray(values, float) if numeric else np.arange(len(values), dtype=float)
     with canvas(2.1 * len(content.metrics) + 0.6, rows=len(content.metrics), sharex=True) as (figure, axes):
-        for axis, metric in zip(axes, content.metrics, strict=True):
-            _panel(axis, content, metric, places)
         if numeric:
             _scale(axes[-1], places)
+        for axis, metric in zip(axes, content.metrics, strict=True):
+            _panel(axis, content, metric, places)
         axes[-1].set_xticks(np.unique(places), list(dict.fromkeys(map(_shown, values))))
         axes[-1].set_xlabel(content.key)
         if axes[0].get_legend_handles_labels()[1]:
@@ -36,17 +36,14 @@ def sweep(content: Sweep) -> Figure:
 def _panel(axis: Axes, content: Sweep, metric: str, places: np.ndarray) -> None:
     where, _, name = metric.rpartition(".")
     words, scale = _WORDS.get(name, (name.replace("_", " "), 1))
-    readings = [trial.metrics[metric] for trial in content.trials]
-    means = scale * np.array([reading.value for reading in readings])
-    bounds = [
-        (reading.value, reading.value) if reading.low is None else (reading.low, reading.high)
-        for reading in readings
-    ]
+    measured = [experiment.metrics[metric] for experiment in content.experiments]
+    means = scale * np.array([each.value for each in measured])
+    bounds = [(each.value,) * 2 if each.low is None else (each.low, each.high) for each in measured]
     errors = np.abs(scale * np.array(bounds, float).T - means)
     axis.plot(places, means, color=QUIET, linewidth=1, linestyle="--", zorder=1)
     axis.errorbar(places, means, yerr=errors, color=BLUE, fmt="o", capsize=3)
-    for place, mean, trial in zip(places, means, content.trials, strict=True):
-        if trial.name == content.base:
+    for place, mean, experiment in zip(places, means, content.experiments, strict=True):
+        if experiment.name == content.base:
             axis.plot(
                 place, mean, "o", color=BLUE, markerfacecolor="white", zorder=3, label="the commit itself"
             )
@@ -58,15 +55,11 @@ def _panel(axis: Axes, content: Sweep, metric: str, places: np.ndarray) -> None:
 
 
 def _scale(axis: Axes, places: np.ndarray) -> None:
-    """Logarithmic where the values span much; linear up to the smallest where 0 is among them."""
-    positive = places[places > 0]
-    if (places < 0).any() or not len(positive) or positive.max() / positive.min() < _WIDE:
-        return
-    if (places == 0).any():
-        axis.set_xscale("symlog", linthresh=positive.min())
-    else:
-        axis.set_xscale("log")
-    axis.minorticks_off()
+    """Logarithmic if the values span much, and linear from the smallest to 0."""
+    sizes = np.abs(places[places != 0])
+    if len(sizes) and sizes.max() / sizes.min() >= _WIDE:
+        axis.set_xscale("symlog", linthresh=sizes.min())
+        axis.minorticks_off()
 
 
 def _shown(value: Any) -> str:
