@@ -17,8 +17,6 @@ from anyview.report.text import write_markdown
 from anyview.runtime.errors import AnyviewError, run_stage
 from anyview.runtime.outputs import whole_folder
 
-PIPELINE = Path("stages/pipeline.yaml")  # a link to dvc.yaml, on which the stage can depend
-
 
 def main(arguments: list[str]) -> None:
     """Report on everything that was run."""
@@ -30,7 +28,7 @@ def main(arguments: list[str]) -> None:
     illustrations = illustrate(study, results)
     text = write_markdown(study, results, illustrations, picture=lambda name: "")
     with_pictures = write_markdown(study, results, illustrations, picture)
-    page = render_page(with_pictures, illustrations, study, read_yaml(PIPELINE))
+    page = render_page(with_pictures, illustrations, study, read_yaml(Path("dvc.yaml")))
     with whole_folder(REPORT) as folder:
         (folder / "figures").mkdir()
         for name, svg in illustrations.figures.items():

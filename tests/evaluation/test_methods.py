@@ -98,18 +98,18 @@ def test_the_evaluation_runs_each_baseline(study: Params, tmp_path: Path, cell: 
     np.testing.assert_array_equal(result.rollouts[1, :, :, 32:], demonstrations[0])
     if cell == "tcn":
         np.testing.assert_allclose(
-            result.runs["return_still"], -49 * _units(study, contexts, demonstrations), rtol=1e-3
+            result.runs["return_still"], -49 * _scales(study, contexts, demonstrations), rtol=1e-3
         )
     else:
         assert result.curve["expert_accuracy"].between(0, 1).all()
         assert "return_still" not in result.runs
 
 
-def _units(study: Params, contexts: list[Context], demonstrations: np.ndarray) -> np.ndarray:
+def _scales(study: Params, contexts: list[Context], demonstrations: np.ndarray) -> np.ndarray:
     batch = PusherBatch(contexts, "twist", 32)
     batch.reset()
     model = load_embedding(Path("data/models/tcn"))
-    return EmbeddingReward(model, demonstrations, batch.render(), time_power=0.0).units
+    return EmbeddingReward(model, demonstrations, batch.render(), time_power=0.0).scales
 
 
 def test_discriminators_learn_from_the_training_split_alone(study: Params):
