@@ -22,6 +22,7 @@ from anyview.evaluation.runs import explore
 from anyview.learners.trpo import TRPO
 from anyview.pusher.batch import ACTION_SIZE, ACTIONS, OBSERVATION_SIZE, PusherBatch
 from anyview.pusher.contexts import Context, sample_contexts
+from anyview.pusher.episodes import episode
 from anyview.pusher.expert import roll_out
 from anyview.pusher.render import renderer
 from anyview.seeds import stream
@@ -46,11 +47,11 @@ def make_reward(method: str, params: Params, contexts: list[Context], clips: np.
 
 def perform(pushers: PusherBatch, learner: TRPO, expert: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Mean distance (R,) of the object from where ``expert`` (R, 50, 5) has it, and final distance (R,)."""
-    observations, away = pushers.reset(), []
-    for step in range(1, ACTIONS + 1):
-        observations = pushers.step(learner.act(observations[:, None], explore=False)[:, 0])
-        away.append(np.linalg.norm(pushers.positions()[:, 3:] - expert[:, step, 3:], axis=-1))
-    return np.mean(away, axis=0), pushers.distance()
+    away = [
+        np.linalg.norm(pushers.positions()[:, 3:] - expert[:, now.step, 3:], axis=-1)
+        for now in episode(pushers, lambda now: learner.act(now.observations[:, None], explore=False)[:, 0])
+    ]
+    return np.mean(away[1:], axis=0), pushers.distance()
 
 
 def shared_context(method: str, episodes: int) -> None:

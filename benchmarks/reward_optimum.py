@@ -21,8 +21,8 @@ from anyview.pusher.expert import roll_out
 from anyview.pusher.render import renderer
 from anyview.rewards.demonstration import translate_demonstrations
 from anyview.seeds import stream
-from anyview.translator.network import to_input
 from anyview.translator.weights import load_translator
+from anyview.video.pixels import to_input
 
 REACH = 6  # centimetres each way
 
@@ -50,6 +50,8 @@ def main() -> None:
     steps = np.arange(-REACH, REACH + 1)
     offsets = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     away = np.linalg.norm(offsets, axis=-1)
+    weights = params.imitation.cells["ours"].weights
+    phi = weights.image / weights.feature
     costs: dict[str, list[np.ndarray]] = {
         "L_f": [],
         "L_i": [],

@@ -8,8 +8,8 @@ from anyview.ingest import clips as ingest
 from anyview.runtime.errors import AnyviewError, run_stage
 from anyview.runtime.outputs import whole_folder
 from anyview.runtime.progress import track
-from anyview.runtime.scratch import content_key, scratch_folder
-from anyview.runtime.workers import run_units
+from anyview.runtime.scratch import checkpoint_folder
+from anyview.runtime.workers import run_tasks
 
 OUTPUT = paths.clip_set(paths.REAL)
 
@@ -21,12 +21,12 @@ def main(arguments: list[str]) -> None:
     params = load_params().real
     source, limits = paths.raw(params.source), params.ingest
     candidates = ingest.read_candidates(source)
-    scratch = scratch_folder("checkpoints", content_key(["ingest", limits.model_dump()]))
+    scratch = checkpoint_folder(["ingest", limits.model_dump()])
 
     verdicts = []
-    units = [(source, scratch, candidate, limits) for candidate in candidates]
-    with track("ingest", len(units)) as progress:
-        for verdict in run_units(ingest.ingest_clip, units):
+    tasks = [(source, scratch, candidate, limits) for candidate in candidates]
+    with track("ingest", len(tasks)) as progress:
+        for verdict in run_tasks(ingest.ingest_clip, tasks):
             verdicts.append(verdict)
             progress.advance()
     verdicts = ingest.settle(candidates, verdicts)

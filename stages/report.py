@@ -17,6 +17,8 @@ from anyview.report.text import write_markdown
 from anyview.runtime.errors import AnyviewError, run_stage
 from anyview.runtime.outputs import whole_folder
 
+PIPELINE = Path("stages/pipeline.yaml")  # a link to dvc.yaml, on which the stage can depend
+
 
 def main(arguments: list[str]) -> None:
     """Report on everything that was run."""
@@ -28,7 +30,7 @@ def main(arguments: list[str]) -> None:
     illustrations = illustrate(study, results)
     text = write_markdown(study, results, illustrations, picture=lambda name: "")
     with_pictures = write_markdown(study, results, illustrations, picture)
-    page = render_page(with_pictures, illustrations, study, read_yaml(Path("dvc.yaml")))
+    page = render_page(with_pictures, illustrations, study, read_yaml(PIPELINE))
     with whole_folder(REPORT) as folder:
         (folder / "figures").mkdir()
         for name, svg in illustrations.figures.items():

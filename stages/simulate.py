@@ -21,8 +21,8 @@ from anyview.runtime.errors import choose, run_stage
 from anyview.runtime.once import once
 from anyview.runtime.outputs import whole_folder, write_atomically
 from anyview.runtime.progress import track
-from anyview.runtime.scratch import content_key, scratch_folder
-from anyview.runtime.workers import run_units
+from anyview.runtime.scratch import checkpoint_folder
+from anyview.runtime.workers import run_tasks
 from anyview.seeds import stream
 from anyview.video.sets import StoredFile, write_set, write_shard
 
@@ -62,17 +62,16 @@ def main(arguments: list[str]) -> None:
     params = load_params()
     name = choose(arguments, params.simulate.sets, "python stages/simulate.py SET")
     wanted, shard, size = params.simulate.sets[name], params.simulate.shard, params.sim.image_size
-    key = content_key(["simulate", params.base.seed, name, wanted.contexts, shard, size])
-    folder = scratch_folder("checkpoints", key)
+    folder = checkpoint_folder(["simulate", params.base.seed, name, wanted.contexts, shard, size])
 
     counts = [min(shard, wanted.demos - first) for first in range(0, wanted.demos, shard)]
-    units = [
+    tasks = [
         (folder, params.base.seed, name, wanted.contexts, index, count, size)
         for index, count in enumerate(counts)
     ]
     records = []
     with track(f"simulate {name}", wanted.demos) as progress:
-        for record in run_units(simulate_shard, units):
+        for record in run_tasks(simulate_shard, tasks):
             records.append(record)
             progress.advance(record["file"]["clips"])
 

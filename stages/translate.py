@@ -9,8 +9,8 @@ from anyview.config import load_params
 from anyview.runtime.errors import choose, run_stage
 from anyview.runtime.outputs import whole_folder
 from anyview.seeds import stream
-from anyview.training.sampling import open_dataset
 from anyview.translator.weights import load_translator
+from anyview.video.datasets import open_dataset
 
 
 def main(arguments: list[str]) -> None:

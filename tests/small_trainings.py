@@ -1,4 +1,4 @@
-"""A small dataset of moving discs, and small recipes."""
+"""A small dataset of moving discs, and what small translators are trained for on it."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from anyview.config import LossWeights, Training, TranslatorCell
-from anyview.training.sampling import Dataset
-from anyview.training.trainer import Recipe
+from anyview.training.translator import TranslatorObjective
+from anyview.video.datasets import Dataset
 from anyview.video.sets import write_clips, write_set
 from tests.training.discworld import clip_table, disc_clips
 
@@ -19,10 +19,10 @@ def discs() -> Dataset:
 
 
 @pytest.fixture
-def recipe() -> Callable[..., Recipe]:
-    """Make a small recipe; keyword arguments change the cell, or the training shared by cells."""
+def make_objective(discs) -> Callable[..., TranslatorObjective]:
+    """Make the objective of a small translator; keyword arguments change the cell, or the shared training."""
 
-    def make(**changes: object) -> Recipe:
+    def make(kind: type[TranslatorObjective] = TranslatorObjective, **changes: object) -> TranslatorObjective:
         weights = {"translation": 1.0, "reconstruction": 1.0, "alignment": 1.0}
         training = {
             "batch_size": 10,
@@ -41,7 +41,7 @@ def recipe() -> Callable[..., Recipe]:
             "augment": False,
         }
         shared = {name: changes.pop(name) for name in list(changes) if name in training}
-        return Recipe("sim", TranslatorCell(**cell | changes), Training(**training | shared), seed=1)
+        return kind(TranslatorCell(**cell | changes), Training(**training | shared), 1, discs)
 
     return make
 

@@ -127,9 +127,14 @@ def code_of(stage: str) -> dict[str, set[str]]:
     """Code that the cells of ``stage`` declare, files and folders."""
     cells = {name: deps for name, (deps, _) in declared().items() if name.split("@")[0] == stage}
     assert cells, f"{stage}: not in dvc.yaml"
-    return {
-        name: {dep for dep in deps if dep.startswith(("src/", "stages/"))} for name, deps in cells.items()
-    }
+    other = ("data/", "params.yaml", "stages/pipeline.yaml")
+    return {name: {dep for dep in deps if not dep.startswith(other)} for name, deps in cells.items()}
+
+
+def test_the_report_depends_on_the_pipeline_that_it_draws():
+    """By a link: DVC does not take dvc.yaml itself for a dependency."""
+    assert "stages/pipeline.yaml" in declared()["report"][0]
+    assert (ROOT / "stages/pipeline.yaml").resolve() == ROOT / "dvc.yaml"
 
 
 def covers(dependency: str, file: str) -> bool:
@@ -178,6 +183,9 @@ def test_an_edit_reruns_no_more_than_it_must():
         assert other not in {learners[name] for name in again}
     for reward in ("gail", "tpil"):
         assert rerun_by(f"src/anyview/adversarial/{reward}.py") == {f"discriminate@{reward}", "report"}
+    embedded = {name.split("@")[0] for name in rerun_by("src/anyview/training/embedding.py")}
+    assert embedded == {"embed", "imitate", "report"}
+    assert not {name for name in rerun_by("src/anyview/training/translator.py") if name.startswith("embed@")}
     assessed = rerun_by("src/anyview/assessment/similarity.py")
     assert {name.split("@")[0] for name in assessed} == {"translate", "report"}
     for folder in ("report", "analysis"):

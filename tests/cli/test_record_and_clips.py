@@ -215,7 +215,7 @@ def test_clips_lists_sets_splits_and_refusals_and_writes_a_sheet(tmp_path, root)
     from anyview.video.sets import write_clips, write_set
 
     (tmp_path / "params.yaml").write_text((root / "params.yaml").read_text())
-    folder = tmp_path / "data" / "real" / "clips"
+    folder = tmp_path / "data" / "clips" / "real"
     folder.mkdir(parents=True)
     rows, files = [], []
     for index, kind in enumerate(["standard", "standard", "extreme_distractor"]):

@@ -10,7 +10,8 @@ import torch
 
 from anyview.adversarial import gail, tpil
 from anyview.config import Params, parse_params, read_yaml
-from anyview.embedding.embedding import Embedding, load_embedding, save_embedding
+from anyview.embedding.network import Embedding
+from anyview.embedding.weights import load_embedding, save_embedding
 from anyview.evaluation.demonstrations import imitated_demonstrations, training_clips
 from anyview.evaluation.methods import Method
 from anyview.evaluation.runs import evaluate_group
@@ -20,7 +21,7 @@ from anyview.pusher.contexts import Context, sample_contexts
 from anyview.rewards.cells import make_reward
 from anyview.rewards.embedding import EmbeddingReward
 from anyview.seeds import stream
-from anyview.translator.network import to_input
+from anyview.video.pixels import to_input
 from anyview.video.sets import write_set, write_shard
 
 METHODS = {
@@ -45,7 +46,7 @@ def test_reward_is_the_squared_distance_to_the_mean_embedding(model, expert_clip
     seen = np.stack([expert_clips[2:4, 7], expert_clips[3:5, 9]], axis=1)  # 2 runs, 2 copies
     target = model(to_input(expert_clips[:2, 7])).mean(0)
     away = ((model(to_input(seen)[0]) - target) ** 2).sum(-1)
-    expected = -((7 / 49) ** 2) * away.numpy() / reward.units[0]
+    expected = -((7 / 49) ** 2) * away.numpy() / reward.scales[0]
     np.testing.assert_allclose(reward.step(seen, 7)[0], expected, rtol=1e-4)
 
 

@@ -6,7 +6,8 @@ import torch
 
 from anyview.config import RewardWeights
 from anyview.rewards.demonstration import DemonstrationReward, translate_demonstrations, true_demonstrations
-from anyview.translator.network import ContextTranslator, to_input
+from anyview.translator.network import ContextTranslator
+from anyview.video.pixels import to_input
 
 
 def literal(
@@ -56,7 +57,7 @@ def test_reward_is_the_equations(translator, expert_clips, feature: bool, image:
                 ratio = phi * still[run, 0] / still[run, 1]
                 plain = l_f + ratio * l_i if feature else l_i
                 np.testing.assert_allclose(
-                    got[run, copy] * reward.units[run], (t / 49) ** power * plain, rtol=1e-4
+                    got[run, copy] * reward.scales[run], (t / 49) ** power * plain, rtol=1e-4
                 )
 
 

@@ -17,19 +17,19 @@ from anyview.adversarial.common.discriminators import (
 )
 from anyview.evaluation.demonstrations import training_clips
 from anyview.evaluation.methods import Group, Scoring, first_demonstration
-from anyview.learners.common.policies import with_time_bumps
+from anyview.learners.common.policies import with_time_features
 
 _CHANNELS = (16, 32, 32)
 _WIDTH = 64
-_BUMPS = 10
+_TIME_FEATURES = 10
 _LEAK = 0.2
 
 
 class FrameDiscriminator(Discriminator):
     """D(o_t, t): three strided convolutions on the frame at half its size; time joins the connected layer.
 
-    Time comes as overlapping bumps beside the number: from the number alone the discriminator learns many
-    times slower that the same frame is the expert's at one time and not at another.
+    Time comes as radial basis functions beside the number. From the number alone the discriminator learns
+    many times slower that the same frame is the expert's at one time and not at another.
     """
 
     def __init__(self, image_size: int):
@@ -40,12 +40,12 @@ class FrameDiscriminator(Discriminator):
             layers += [nn.Conv2d(before, channels, 3, stride=2, padding=1), nn.LeakyReLU(_LEAK)]
             before, side = channels, -(-side // 2)
         self.features = nn.Sequential(*layers, nn.Flatten())
-        self.hidden = nn.Linear(before * side**2 + 1 + _BUMPS, _WIDTH)
+        self.hidden = nn.Linear(before * side**2 + 1 + _TIME_FEATURES, _WIDTH)
         self.output = nn.Linear(_WIDTH, 1)
 
     def logits(self, views: Views) -> Tensor:
         """log D/(1 - D), (B,)."""
-        time = with_time_bumps(2 * views.time[:, None] - 1, _BUMPS)
+        time = with_time_features(2 * views.time[:, None] - 1, _TIME_FEATURES)
         inputs = torch.cat([self.features(views.now), time], dim=1)
         return self.output(F.leaky_relu(self.hidden(inputs), _LEAK)).squeeze(1)
 
@@ -76,4 +76,4 @@ def make_reward(group: Group) -> Scoring:
     experts = [ClipSet(frames, rows)] * len(runs)
     episodes = params.imitation.trpo.batch_episodes
     reward = gail_reward(params.adversarial.discriminator, params.base.seed, runs, experts, episodes)
-    return Scoring(reward, np.ones(len(runs)), first_demonstration(group), judges=False)
+    return Scoring(reward, np.ones(len(runs)), first_demonstration(group), fixed=False)

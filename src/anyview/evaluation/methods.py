@@ -31,16 +31,16 @@ class Group:
 
 @dataclass(frozen=True)
 class Scoring:
-    """A reward and how to report it: returns times ``units`` (R,) are in its equations' own units.
+    """A reward and how to report it: returns times ``scales`` (R,) are in its equations' own units.
 
-    ``shown`` (R, 50, H, W, 3) is the demonstration that each run imitates, as the reward sees it. ``judges``
-    says whether the reward can score any motion before training, for the return table.
+    ``shown`` (R, 50, H, W, 3) is the demonstration that each run imitates, as the reward sees it. ``fixed``
+    says that the reward does not learn: it can score any motion, for the return table.
     """
 
     reward: RewardSource
-    units: np.ndarray
+    scales: np.ndarray
     shown: np.ndarray
-    judges: bool
+    fixed: bool
 
 
 MakeLearner = Callable[[Params, Sequence[int]], Learner]

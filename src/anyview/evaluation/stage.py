@@ -3,6 +3,7 @@
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -15,8 +16,8 @@ from anyview.evaluation.runs import evaluate_group, groups_of
 from anyview.learners.common.policies import save_policies
 from anyview.pusher.contexts import sample_contexts
 from anyview.runtime.outputs import whole_folder, write_atomically
-from anyview.runtime.scratch import content_key, scratch_folder
-from anyview.runtime.workers import run_units
+from anyview.runtime.scratch import checkpoint_folder
+from anyview.runtime.workers import run_tasks
 from anyview.seeds import stream
 from anyview.video.files import write_video
 
@@ -36,14 +37,14 @@ def evaluate_method(name: str, params: Params, method: Method, sources: Sequence
     """
     contexts, _ = sample_contexts(stream(params.base.seed, "evaluation"), params.imitation.runs)
     chosen, demonstrations = imitated_demonstrations(params)
-    key = _key(name, params, sources)
     groups = groups_of(len(contexts))
-    scratch = [scratch_folder("checkpoints", f"{key}-{index}") for index in range(len(groups))]
-    units = [
+    values, files = _origin(name, params, sources)
+    scratch = [checkpoint_folder([*values, index], files) for index in range(len(groups))]
+    tasks = [
         (name, params, method, group, [contexts[run] for run in group], demonstrations, folder)
         for group, folder in zip(groups, scratch, strict=True)
     ]
-    results = list(run_units(evaluate_group, units))
+    results = list(run_tasks(evaluate_group, tasks))
     runs = pd.concat([result.runs for result in results], ignore_index=True)
     curve = pd.concat([result.curve for result in results], ignore_index=True)
     with whole_folder(paths.policies(name)) as output:
@@ -65,12 +66,11 @@ def evaluate_method(name: str, params: Params, method: Method, sources: Sequence
     print(f"{name}: {runs['success'].sum()} of {len(runs)} succeed; median distance {distance:.1f} cm")
 
 
-def _key(name: str, params: Params, sources: Sequence[Path]) -> str:
-    """Changes with everything that the checkpoints of a cell depend on."""
+def _origin(name: str, params: Params, sources: Sequence[Path]) -> tuple[list[Any], list[Path]]:
+    """The values and files that the checkpoints of a cell depend on."""
     values = params.model_dump(include={"base", "sim", "imitation", "adversarial"})
     for block in ("imitation", "adversarial"):
         values[block]["cells"] = values[block]["cells"].get(name)
     dataset = params.imitation.dataset
     files = [paths.clip_set(dataset) / "files.csv", paths.split_table(dataset)]
-    files += [file for source in sources for file in sorted(source.iterdir())]
-    return content_key([name, values], files)
+    return [name, values], files + [file for source in sources for file in sorted(source.iterdir())]

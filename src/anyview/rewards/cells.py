@@ -6,7 +6,8 @@ import numpy as np
 
 from anyview import paths
 from anyview.config import DemonstrationCell, EmbeddingRewardCell
-from anyview.embedding.embedding import Embedding, load_embedding
+from anyview.embedding.network import Embedding
+from anyview.embedding.weights import load_embedding
 from anyview.evaluation.methods import Group, Scoring, first_demonstration
 from anyview.rewards.demonstration import DemonstrationReward, translate_demonstrations, true_demonstrations
 from anyview.rewards.embedding import EmbeddingReward
@@ -35,14 +36,14 @@ def _demonstrated(group: Group, cell: DemonstrationCell) -> Scoring:
     else:
         targets = translate_demonstrations(model, group.demonstrations, first)
     reward = DemonstrationReward(model, *targets, first, cell.weights, cell.time_power)
-    return Scoring(reward, reward.units, reward.targets(), judges=True)
+    return Scoring(reward, reward.scales, reward.targets(), fixed=True)
 
 
 def _embedded(group: Group, cell: EmbeddingRewardCell) -> Scoring:
     """The distance to the demonstrations in a time-contrastive embedding, which nothing translates."""
     model = _fitting(load_embedding(paths.model(cell.model)), cell.model, group.params.sim.image_size)
     reward = EmbeddingReward(model, group.demonstrations, group.own[:, 0], cell.time_power)
-    return Scoring(reward, reward.units, first_demonstration(group), judges=True)
+    return Scoring(reward, reward.scales, first_demonstration(group), fixed=True)
 
 
 def _fitting(model: Model, name: str, size: int) -> Model:

@@ -13,7 +13,8 @@ from torch import Tensor
 
 from anyview.config import RewardWeights
 from anyview.learners.common.interfaces import Arrays
-from anyview.translator.network import ContextTranslator, to_frames, to_input
+from anyview.translator.network import ContextTranslator
+from anyview.video.pixels import to_frames, to_input
 
 _BATCH = 64
 
@@ -25,7 +26,7 @@ class DemonstrationReward:
     standing still. So standing still earns -1 a step in every context and with every translator, one learning
     rate serves them all, and the weights have no unit. A term of weight 0 is not computed.
 
-    ``units`` (R,) brings a reward back to the equations' scale, where L_f has weight 1: reward * units =
+    ``scales`` (R,) bring a reward back to the equations' scale, where L_f has weight 1: reward * scales =
     L_f + phi (u_f/u_i) L_i with phi = w_i/w_f, or L_i where w_f is 0.
     """
 
@@ -48,13 +49,13 @@ class DemonstrationReward:
         with torch.inference_mode():
             still_features = ((model.encode_expert(first)[:, None] - features) ** 2).sum(-1)
             still_images = ((first[:, None] - images) ** 2).sum((2, 3, 4))
-        feature_unit = (self._weights * still_features).mean(1).clamp_min(1e-6)
-        image_unit = (self._weights * still_images).mean(1).clamp_min(1e-6)
+        feature_cost = (self._weights * still_features).mean(1).clamp_min(1e-6)
+        image_cost = (self._weights * still_images).mean(1).clamp_min(1e-6)
         norm = weights.feature + weights.image
-        self._feature_scale = weights.feature / norm / feature_unit[:, None]
-        self._image_scale = weights.image / norm / image_unit[:, None]
-        leading = feature_unit / weights.feature if weights.feature else image_unit / weights.image
-        self.units = (leading * norm).cpu().numpy()
+        self._feature_scale = weights.feature / norm / feature_cost[:, None]
+        self._image_scale = weights.image / norm / image_cost[:, None]
+        leading = feature_cost / weights.feature if weights.feature else image_cost / weights.image
+        self.scales = (leading * norm).cpu().numpy()
 
     @torch.inference_mode()
     def step(self, frames: np.ndarray, step: int) -> np.ndarray:

@@ -43,6 +43,15 @@ def content_key(values: Any, files: Iterable[Path] = ()) -> str:
     return digest.hexdigest()[:24]
 
 
+def checkpoint_folder(values: Any, files: Iterable[Path] = ()) -> Path:
+    """Folder for checkpoints of work that depends on ``values``, on ``files`` and on our code.
+
+    ``values`` are JSON-serialisable. A change in any of these gives another folder, so that nothing stale is
+    continued.
+    """
+    return scratch_folder("checkpoints", content_key(values, files))
+
+
 def scratch_folder(kind: str, key: str) -> Path:
     """Folder ``<scratch>/<kind>/<key>``, created. ``kind`` is one of ``KINDS``.
 

@@ -15,7 +15,7 @@ from torch.nn import functional as F
 from anyview import config
 from anyview.learners.common.interfaces import Arrays
 from anyview.seeds import stream, torch_seed
-from anyview.translator.network import to_input
+from anyview.video.pixels import to_input
 
 
 @dataclass(frozen=True)
@@ -80,6 +80,7 @@ class LearnedReward:
     They stay as they are while ``episodes`` episodes of each run are gathered, as many as the learner takes
     for one policy step, so that all rewards of a policy step have one scale. Then each takes ``params.steps``
     Adam steps on batches of these episodes and of ``sets[r]``, run r's sets of others' clips by name.
+    ``networks`` are the discriminators, one a run.
     """
 
     def __init__(
@@ -93,12 +94,12 @@ class LearnedReward:
     ):
         self._params, self._seed, self._runs = params, seed, list(runs)
         self._sets, self._episodes = list(sets), episodes
-        self._networks: list[Discriminator] = []
+        self.networks: list[Discriminator] = []
         with torch.random.fork_rng(devices=[]):
             for run in runs:
                 torch.manual_seed(torch_seed(seed, "discriminator-weights", run))
-                self._networks.append(make())
-        self._modules = nn.ModuleList(self._networks)
+                self.networks.append(make())
+        self._modules = nn.ModuleList(self.networks)
         self._optimizer = torch.optim.Adam(self._modules.parameters(), params.learning_rate)
         self._shape = sets[0]["expert"].frames.shape[1:]
         self._iteration = 0
@@ -114,7 +115,7 @@ class LearnedReward:
         self._seen[:, :, step] = frames
         time = torch.full((copies,), step / (self._shape[0] - 1))
         rewards = []
-        for network, seen in zip(self._networks, self._seen, strict=True):
+        for network, seen in zip(self.networks, self._seen, strict=True):
             now, before = to_input(seen[:, step]), to_input(seen[:, max(step - network.lag, 1)])
             rewards.append(network.reward(network.logits(Views(before, now, time))))
         return torch.stack(rewards).numpy()
@@ -124,7 +125,7 @@ class LearnedReward:
         with torch.inference_mode():
             measures = [
                 network.accuracies(self._draw(row, self._seen, "discriminator-measures", self._iteration))
-                for row, network in enumerate(self._networks)
+                for row, network in enumerate(self.networks)
             ]
         self._gathered = np.concatenate([self._gathered, self._seen], axis=1)
         self._iteration += 1
@@ -140,7 +141,7 @@ class LearnedReward:
             self._draw(row, self._gathered, "discriminator-batch", self._iteration, index)
             for row in range(len(self._runs))
         )
-        losses = [network.loss(views) for network, views in zip(self._networks, batches, strict=True)]
+        losses = [network.loss(views) for network, views in zip(self.networks, batches, strict=True)]
         self._optimizer.zero_grad()
         torch.stack(losses).sum().backward()
         self._optimizer.step()
@@ -149,7 +150,7 @@ class LearnedReward:
         """A batch of each of run ``row``'s sets and of its ``agent`` clips (R, E, T + 1, H, W, 3)."""
         rng = stream(self._seed, name, self._runs[row], *indices)
         sets = {**self._sets[row], "agent": ClipSet(agent[row], np.arange(agent.shape[1]))}
-        lag, count = self._networks[row].lag, self._params.batch_size
+        lag, count = self.networks[row].lag, self._params.batch_size
         return {name: clips.draw(rng, count, lag) for name, clips in sets.items()}
 
     def state(self) -> Arrays:

@@ -1,8 +1,8 @@
-"""Time-paired frames of two clips, to learn from, and the fixed pairs of clips that judge a translator."""
+"""Data sets: clips with the split of each, and which of the held-out clips are paired."""
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -41,32 +41,12 @@ class Dataset:
         return {name: np.flatnonzero(names == name) for name in np.unique(names)}
 
 
-@dataclass(frozen=True)
-class FramePairs:
-    """Frame ``times`` of clips ``sources`` (i) and ``targets`` (j), all three (N,)."""
-
-    sources: np.ndarray
-    targets: np.ndarray
-    times: np.ndarray
-
-    def __len__(self) -> int:
-        return len(self.times)
-
-    def parts(self, count: int) -> list["FramePairs"]:
-        """The pairs in ``count`` runs of about equal length, fewer where there are fewer pairs."""
-        bounds = np.linspace(0, len(self), min(count, len(self)) + 1).round().astype(int)
-        return [
-            FramePairs(self.sources[a:b], self.targets[a:b], self.times[a:b]) for a, b in pairwise(bounds)
-        ]
-
-    def frames(self, dataset: Dataset) -> tuple[np.ndarray, np.ndarray]:
-        """o_t^i and after them o_t^j, uint8 (2N, H, W, 3), and o_0^j, (N, H, W, 3)."""
-        clips, times = np.concatenate((self.sources, self.targets)), np.tile(self.times, 2)
-        return dataset.frames[clips, times], dataset.frames[self.targets, 0]
-
-
 def open_dataset(name: str) -> Dataset:
-    """Open one of the pipeline's datasets; clips that no split names are left with an empty split."""
+    """One of the pipeline's data sets; clips that no split names are left with an empty split.
+
+    Raises AnyviewError if the split table does not fit the clips, leaves fewer than two clips to train on, or
+    none to validate with.
+    """
     folder, table = paths.clip_set(name), paths.split_table(name)
     store = open_frames(folder)
     split = read_split(table)
@@ -82,19 +62,16 @@ def open_dataset(name: str) -> Dataset:
     return dataset
 
 
-def training_pairs(dataset: Dataset, rng: np.random.Generator, count: int) -> FramePairs:
-    """``count`` pairs: any two different clips of the training split, at the same random time."""
-    clips = dataset.split("train")
-    sources = rng.integers(len(clips), size=count)
-    targets = (sources + rng.integers(1, len(clips), size=count)) % len(clips)
-    times = rng.integers(dataset.length, size=count)
-    return FramePairs(clips[sources], clips[targets], times)
+def dataset_files(name: str) -> list[Path]:
+    """The small files that change whenever a data set does, to key what is made from it."""
+    folder, table = paths.clip_set(name), paths.split_table(name)
+    return [folder / "manifest.csv", folder / "files.csv", table]
 
 
 def clip_pairs(dataset: Dataset, split: str) -> list[tuple[int, int]]:
-    """(source, target) clips that judge a translator: every clip of ``split`` once as the target.
+    """(source, target) clips to evaluate a translator on: every clip of ``split`` once as the target.
 
-    The source is the other view of the target's pair, or the next clip where it has none. An ``extreme``
+    The source is the other view of the target's pair, or the next clip if it has none. An ``extreme``
     target's source is a standard validation clip.
     """
     targets = dataset.split(split)
@@ -110,10 +87,3 @@ def clip_pairs(dataset: Dataset, split: str) -> list[tuple[int, int]]:
         others = [clip for clip in targets if clip != target and pairs[clip] == pairs[target]]
         chosen.append((int(others[0] if others else targets[(n + 1) % len(targets)]), int(target)))
     return chosen
-
-
-def validation_pairs(dataset: Dataset, rng: np.random.Generator, count: int) -> FramePairs:
-    """``count`` fixed frame pairs: the validation clips' pairs in turn, each at a random time."""
-    pairs = np.array(clip_pairs(dataset, "validation"))
-    chosen = pairs[np.arange(count) % len(pairs)]
-    return FramePairs(chosen[:, 0], chosen[:, 1], rng.integers(dataset.length, size=count))

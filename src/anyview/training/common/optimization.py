@@ -1,7 +1,7 @@
-"""How a translator's parameters move: an iteration's learning rate, and an optimiser that threads share."""
+"""How parameters move: an iteration's learning rate, and an optimiser that threads share."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor
 
 import numpy as np
@@ -24,14 +24,15 @@ def learning_rate(training: Training, iteration: int, iterations: int) -> float:
 class SharedOptimizer:
     """An optimiser whose parameters are dealt out to ``count`` threads.
 
-    Each moves its own by an optimiser of its own: no parameter's update depends on another's, so the result
-    is that of one optimiser for all.
+    Each thread moves its parameters by an optimiser of its own. No parameter's update depends on another's.
+    So the result is that of one optimiser for all.
     """
 
-    def __init__(self, parameters: Sequence[nn.Parameter], make: MakeOptimizer, count: int):
+    def __init__(self, parameters: Iterable[nn.Parameter], make: MakeOptimizer, count: int):
+        self.count = count
         self._parameters = list(parameters)
-        self._shares = _deal([parameter.numel() for parameter in self._parameters], count)
-        self._optimizers = [make([self._parameters[n] for n in share]) for share in self._shares]
+        self._hands = _deal([parameter.numel() for parameter in self._parameters], count)
+        self._optimizers = [make([self._parameters[n] for n in hand]) for hand in self._hands]
 
     def step(self, rate: float, gradients: Sequence[Gradients], pool: Executor) -> None:
         """One update at ``rate`` by the sum of ``gradients``, of all parameters for each part of a batch.
@@ -41,7 +42,7 @@ class SharedOptimizer:
 
         def move(number: int) -> None:
             optimizer = self._optimizers[number]
-            for n in self._shares[number]:
+            for n in self._hands[number]:
                 self._parameters[n].grad = _sum(self._parameters[n], [part[n] for part in gradients])
             for group in optimizer.param_groups:
                 group["lr"] = rate
@@ -52,8 +53,8 @@ class SharedOptimizer:
     def arrays(self) -> dict[str, np.ndarray]:
         """The state as ``N/key`` of the parameter's number, for a checkpoint."""
         return {
-            f"{share[index]}/{key}": value.cpu().numpy()
-            for share, optimizer in zip(self._shares, self._optimizers, strict=True)
+            f"{hand[index]}/{key}": value.cpu().numpy()
+            for hand, optimizer in zip(self._hands, self._optimizers, strict=True)
             for index, state in optimizer.state_dict()["state"].items()
             for key, value in state.items()
         }
@@ -66,17 +67,17 @@ class SharedOptimizer:
             parameter, value = self._parameters[int(number)], torch.from_numpy(array)
             moment = value.shape == parameter.shape
             states.setdefault(int(number), {})[key] = _laid_out_as(parameter if moment else value, value)
-        for share, optimizer in zip(self._shares, self._optimizers, strict=True):
-            own = {index: states[n] for index, n in enumerate(share) if n in states}
+        for hand, optimizer in zip(self._hands, self._optimizers, strict=True):
+            own = {index: states[n] for index, n in enumerate(hand) if n in states}
             optimizer.load_state_dict(optimizer.state_dict() | {"state": own})
 
 
 def _deal(sizes: list[int], count: int) -> list[list[int]]:
-    """The numbers of all parameters in ``count`` shares of about equal size, the largest dealt first."""
-    shares: list[list[int]] = [[] for _ in range(count)]
+    """The numbers of all parameters in ``count`` hands of about equal size, the largest dealt first."""
+    hands: list[list[int]] = [[] for _ in range(count)]
     for n in sorted(range(len(sizes)), key=lambda n: -sizes[n]):
-        min(shares, key=lambda share: sum(sizes[m] for m in share)).append(n)
-    return shares
+        min(hands, key=lambda hand: sum(sizes[m] for m in hand)).append(n)
+    return hands
 
 
 def _laid_out_as(like: Tensor, value: Tensor) -> Tensor:

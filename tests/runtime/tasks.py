@@ -1,4 +1,4 @@
-"""Units of work for the tests of workers, in a module that worker processes can import."""
+"""Tasks for the tests of workers, in a module that worker processes can import."""
 
 import os
 import time
@@ -25,11 +25,11 @@ def queue(gate: str, number: int) -> int:
 
 def draw(number: int) -> bytes:
     """Some arithmetic that depends on a stream of its own."""
-    return np.linalg.inv(stream(1, "unit", number).normal(size=(60, 60))).tobytes()
+    return np.linalg.inv(stream(1, "task", number).normal(size=(60, 60))).tobytes()
 
 
 def refuse(number: int) -> int:
-    """A user error in the third unit."""
+    """A user error in the third task."""
     if number == 2:
         raise AnyviewError("clip-2.avi: cut short")
     return number
@@ -43,6 +43,6 @@ def die(number: int) -> int:
 
 
 def mark(values: np.ndarray, number: int) -> int:
-    """Write into a large array, which is the unit's own."""
+    """Write into a large array, which is the task's own."""
     values[0] = number
     return int(values.sum())
