@@ -173,8 +173,9 @@ def whole_study(root: Path) -> None:
 
 def run_report(root: Path) -> subprocess.CompletedProcess:
     """Run the report stage in ``root`` as DVC would, with the repository's own params and pipeline."""
-    for name in ("params.yaml", "dvc.yaml"):
-        shutil.copy(ROOT / name, root)
+    (root / "stages").mkdir(exist_ok=True)
+    for name in ("params.yaml", "stages/pipeline.yaml"):
+        shutil.copy(ROOT / name, root / name)
     command = [sys.executable, ROOT / "stages/report.py"]
     return subprocess.run(command, cwd=root, capture_output=True, text=True)
 

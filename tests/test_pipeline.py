@@ -117,7 +117,7 @@ def test_what_no_stage_reads_is_checked_as_well(smoke, tmp_path, before, after, 
 
 
 def test_metrics_are_plain_rounded_numbers(metrics):
-    assert metrics.keys() == {"data", "translation", "imitation"}
+    assert metrics.keys() == {"summary", "data", "translation", "imitation"}
     for name, value in leaves(metrics):
         assert isinstance(value, int | float), name
         assert not isinstance(value, bool), name
