@@ -15,6 +15,8 @@ from anyview.runtime.errors import AnyviewError
 from tests.review.commands import run
 
 LOSSES = ("loss", "translation", "reconstruction", "alignment", "psnr", "ssim")
+STILL = ("copy_loss", "mean_loss")
+PLACED = ("placed", "placed_on_way", "copy_placed")
 
 
 def bounded(*names: str) -> list[str]:
@@ -54,14 +56,17 @@ def test_translation_keys_and_values(trees, study, full):
     assert list(translation) == list(study.translators)
     assert list(translation["sim"]) == ["iterations", "best_iteration", "surrogate", "validation"]
     assert list(translation["real-adam"]) == [*translation["sim"], "extreme"]
-    assert list(translation["sim"]["validation"]) == bounded(*LOSSES)
-    assert list(translation["real-adam"]["extreme"]) == bounded(*LOSSES, "ratio")
+    assert list(translation["sim"]["validation"]) == bounded(*LOSSES, *STILL, *PLACED)
+    assert list(translation["real-adam"]["extreme"]) == bounded(*LOSSES, *STILL, *PLACED, "ratio")
+    assert list(translation["real-adadelta"]["validation"]) == bounded(*LOSSES, *STILL)  # nothing is blue
     assert (translation["sim"]["surrogate"], translation["real-adam"]["surrogate"]) == (0, 1)
     assert (translation["sim"]["iterations"], translation["sim"]["best_iteration"]) == (520, 480)
     clips = pd.read_csv(full / "data/translations/real-adam/clips.csv")
     means = clips.groupby("split")["translation"].mean()
     ratio = means["extreme"] / means["validation"]
     assert translation["real-adam"]["extreme"]["ratio"] == pytest.approx(ratio, rel=5e-4)
+    placed = clips["placed"][clips["split"] == "extreme"].mean()
+    assert translation["real-adam"]["extreme"]["placed"] == pytest.approx(placed, rel=5e-4)
 
 
 def test_imitation_keys_and_values(trees, study, full):

@@ -10,7 +10,7 @@ from anyview.analysis import comparisons, curves
 from anyview.analysis.cells import ADAM, AUGMENTED, SIM, in_order
 from anyview.analysis.diagnosis import Diagnosis, diagnose
 from anyview.analysis.estimates import Estimate, Estimator, proportion, tidy, without_interval
-from anyview.analysis.study import LOSSES, RETURNS, AssessedTranslator, EvaluatedMethod, Study
+from anyview.analysis.study import LOSSES, RETURNS, YARDSTICKS, AssessedTranslator, EvaluatedMethod, Study
 
 Rows = Iterator[tuple[str, str, Estimate]]
 
@@ -38,6 +38,8 @@ class Results:
     learning: pd.DataFrame
     diagnoses: dict[str, Diagnosis]
     distances: pd.DataFrame
+    real: tuple[str, ...]
+    """Translators of real clips, or of their surrogate."""
 
 
 def analyse(study: Study) -> Results:
@@ -62,6 +64,7 @@ def analyse(study: Study) -> Results:
         learning=curves.learning(methods),
         diagnoses={cell: diagnose(method) for cell, method in methods.items()},
         distances=distances(methods),
+        real=tuple(cell for cell in study.translators if study.is_real(cell)),
     )
 
 
@@ -123,6 +126,12 @@ def _translation(study: Study, estimator: Estimator) -> Rows:
             for loss in LOSSES if len(clips) else ():
                 values = clips[loss].to_numpy(float)
                 yield cell, f"{split}.{loss}", estimator.mean(f"{cell}/{split}/{loss}", values, pairs)
+            for name in YARDSTICKS:
+                known = clips[clips[name].notna()]
+                if len(known):
+                    values = known[name].to_numpy(float)
+                    pairs = known["pair"].to_numpy() if "pair" in known else None
+                    yield cell, f"{split}.{name}", estimator.mean(f"{cell}/{split}/{name}", values, pairs)
         if len(translator.split("extreme")):
             yield cell, "extreme.ratio", extreme_ratio(estimator, cell, translator)
 

@@ -16,6 +16,8 @@ from anyview.video.manifests import read_table
 from anyview.video.splits import read_split
 
 LOSSES = ("loss", "translation", "reconstruction", "alignment", "psnr", "ssim")
+YARDSTICKS = ("copy_loss", "mean_loss", "placed", "placed_on_way", "copy_placed")
+"""See ``assessment.yardsticks``; empty for a clip to which one does not apply."""
 RETURNS = ("return_policy", "return_still", "return_arm_only", "return_expert")
 
 
@@ -59,7 +61,10 @@ class TrainedModel:
 
 @dataclass(frozen=True)
 class AssessedTranslator:
-    """A translator on held-out clips: a row per clip (``clip, split``, LOSSES), a weight per frame (T,)."""
+    """A translator on held-out clips: a row per clip, a weight per frame (T,).
+
+    Columns: ``clip, split``, LOSSES, YARDSTICKS.
+    """
 
     folder: Path
     clips: pd.DataFrame
@@ -188,7 +193,8 @@ def _model(folder: Path) -> TrainedModel:
 
 
 def _translator(folder: Path) -> AssessedTranslator:
-    clips = read_table(folder / "clips.csv", ["clip", "split", *LOSSES], unique="clip")
+    clips = read_table(folder / "clips.csv", ["clip", "split", *LOSSES, *YARDSTICKS], unique="clip")
+    clips[list(YARDSTICKS)] = clips[list(YARDSTICKS)].apply(pd.to_numeric, errors="coerce")
     weights = _numbers(folder / "feature_weights.csv", ["frame", "weight"])
     return AssessedTranslator(folder, clips, weights["weight"].to_numpy())
 

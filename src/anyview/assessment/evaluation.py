@@ -11,6 +11,7 @@ import torch
 
 from anyview.assessment.importance import feature_weights
 from anyview.assessment.similarity import psnr, ssim
+from anyview.assessment.yardsticks import yardsticks
 from anyview.config import Assessment
 from anyview.runtime.device import torch_device, use_threads, worker_count
 from anyview.runtime.progress import track
@@ -76,6 +77,7 @@ def evaluate_clip(model: ContextTranslator, dataset: Dataset, source: int, targe
         "last_frame": float(frame_loss(translated[-1:], true[-1:])),
         "psnr": psnr(shown, wanted),
         "ssim": ssim(shown, wanted),
+        **yardsticks(shown, wanted),
     }
     return ClipEvaluation(row, np.concatenate((wanted, shown), axis=2))
 
@@ -89,7 +91,8 @@ def evaluate(
 ) -> None:
     """Fill ``folder`` with what the translator makes of its held-out clips.
 
-    - ``clips.csv``: a row for each of the first ``params.clips`` validation clips and for each extreme clip;
+    - ``clips.csv``: a row for each of the first ``params.clips`` validation clips and for each extreme clip,
+      where ``placed`` and its like are empty for a clip without a blue object;
     - ``clips/<clip>.avi``: of each split the first ``params.shown``, true frames beside the translated ones;
     - ``strips/<clip>.png``: every 7th frame of these, true over translated;
     - ``feature_weights.csv``: the weight of every frame of the expert's clip.
