@@ -30,7 +30,7 @@ def main(arguments: list[str]) -> None:
         for verdict in run_units(ingest.ingest_clip, units):
             verdicts.append(verdict)
             progress.advance()
-    verdicts = ingest.settle(candidates, verdicts)
+    verdicts = ingest.resolve_pairs(candidates, verdicts)
     if all(verdict.reason for verdict in verdicts):
         for candidate, verdict in zip(candidates, verdicts, strict=True):
             print(f"{candidate.file}: {verdict.reason}")

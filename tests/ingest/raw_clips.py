@@ -93,6 +93,6 @@ def candidate(file: str, pair: str = "", kind: str = "standard") -> Candidate:
     return Candidate(Path(file).stem, file, pair or Path(file).stem, "", kind)
 
 
-def judge(source: Path, file: str, folder: Path, limits=LIMITS) -> str:
+def refusal(source: Path, file: str, folder: Path, limits=LIMITS) -> str:
     folder.mkdir(exist_ok=True)
     return ingest_clip(source, folder, candidate(file), limits).reason

@@ -42,7 +42,7 @@ def record(
     from anyview.cli import recording
     from anyview.cli.preview import serving
     from anyview.config import load_params
-    from anyview.ingest.judge import LONGEST
+    from anyview.ingest.normalize import LONGEST
     from anyview.runtime.progress import track
     from anyview.video.pictures import write_png
 

@@ -12,7 +12,7 @@ from typing import Any
 import pandas as pd
 
 from anyview.config import Ingest
-from anyview.ingest.judge import Refused, read_clip
+from anyview.ingest.normalize import Refused, read_clip
 from anyview.ingest.raw_manifest import read_raw_manifest
 from anyview.runtime.errors import AnyviewError
 from anyview.runtime.once import once, sha256
@@ -126,7 +126,7 @@ def _locate(source: Path, candidate: Candidate) -> Path:
     return path
 
 
-def settle(candidates: Sequence[Candidate], verdicts: Sequence[Verdict]) -> list[Verdict]:
+def resolve_pairs(candidates: Sequence[Candidate], verdicts: Sequence[Verdict]) -> list[Verdict]:
     """The final verdicts: duplicates of earlier clips are refused, pairs of which one view alone is extreme,
     and views whose pair lost its other one.
 
