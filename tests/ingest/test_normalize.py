@@ -14,15 +14,7 @@ import pytest
 from anyview.ingest.clips import ingest_clip
 from anyview.ingest.normalize import Refused, read_clip
 from anyview.video.files import read_video
-from tests.ingest.raw_clips import LIMITS, candidate, damaged, pictures, refusal, write_raw
-
-
-def shrunk(frame: np.ndarray) -> np.ndarray:
-    """The middle square at 48 x 48: enlarged to a multiple of that, then the mean of each block."""
-    height, width = frame.shape[:2]
-    left = (width - height) // 2
-    square = cv2.resize(frame[:, left : left + height], (48 * 15, 48 * 15), interpolation=cv2.INTER_NEAREST)
-    return square.reshape(48, 15, 48, 15, 3).mean(axis=(1, 3))
+from tests.ingest.raw_clips import LIMITS, candidate, damaged, pictures, refusal, shrunk, write_raw
 
 
 @pytest.mark.parametrize(
