@@ -24,7 +24,6 @@ def test_a_clip_of_each_kind_becomes_what_the_document_says(tmp_path, kind):
         for k in (0, 13, 40, 79):
             # The best match, within a frame of 15 a second before and after.
             errors = [np.abs(clip[k] - shrunk(expected[10 * k + d])).mean() for d in range(-7 if k else 0, 8)]
-            print("ERR", kind.file, k, min(errors), np.abs(clip[k] - shrunk(expected[10 * (79 - k)])).mean())
             assert min(errors) < 6
 
 

@@ -11,9 +11,11 @@ import typer
 
 from anyview.runtime.errors import AnyviewError
 
+RAW = Path("data/real/raw")
+
 
 def record(
-    folder: Annotated[Path, typer.Argument(help="Where clips and manifest go.")] = Path("data/real/raw"),
+    folder: Annotated[Path, typer.Argument(help="Where clips and manifest go.")] = RAW,
     camera: Annotated[
         list[str] | None,
         typer.Option(
@@ -82,6 +84,13 @@ def clips(
     sheet: Annotated[
         Path | None, typer.Option("--sheet", metavar="PNG", help="Also write a contact sheet of the clips.")
     ] = None,
+    propose: Annotated[
+        bool,
+        typer.Option(
+            "--propose", help="Propose a manifest for the raw clips, with start and end by their motion."
+        ),
+    ] = False,
+    raw: Annotated[Path, typer.Option("--raw", metavar="FOLDER", help="The raw clips to propose for.")] = RAW,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON for a script.")] = False,
 ) -> None:
     """List the clips that there are, by kind, split and source, and the refused with the reason."""
@@ -90,11 +99,29 @@ def clips(
 
     if sheet is not None and sheet.suffix.lower() != ".png":
         raise AnyviewError(f"{sheet}: a contact sheet is a .png file")
+    if propose:
+        _propose(raw, as_json)
+        return
     found = survey(ingested_source() or load_params().real.source)
     print(json.dumps(found, indent=2) if as_json else "\n".join(lines(found)))
     if sheet is not None:
         _write_sheet(sheet)
         print(f"contact sheet: {sheet}", file=sys.stderr if as_json else sys.stdout)
+
+
+def _propose(folder: Path, as_json: bool) -> None:
+    from anyview.cli.proposal import propose
+    from anyview.config import load_params
+
+    table, reasons = propose(folder, load_params().real.ingest)
+    rows = [row | {"reason": reasons.get(row["file"], "")} for row in table.to_dict("records")]
+    if as_json:
+        print(json.dumps({"manifest": str(folder / "manifest.proposed.csv"), "clips": rows}, indent=2))
+        return
+    for row in rows:
+        print(f"{row['file']}: {row['reason'] or '{start} to {end} s'.format(**row)}")
+    print(f"check {folder / 'manifest.proposed.csv'} by the pictures in {folder / 'manifest.proposed.png'};")
+    print("then rename it to manifest.csv")
 
 
 def _write_sheet(path: Path) -> None:

@@ -37,6 +37,22 @@ class Stretch(NamedTuple):
     end: float
 
 
+def parse_stretch(start: str, end: str) -> Stretch | None:
+    """The stretch that a row of a manifest asks for, None if both are empty; raises ``Refused``."""
+    if not (start or end):
+        return None
+    given = f"start {start or 'empty'}, end {end or 'empty'}"
+    try:
+        stretch = Stretch(float(start), float(end))
+    except ValueError:
+        raise Refused(f"{given}: two numbers of seconds are needed, or none") from None
+    if not 0 <= stretch.start < stretch.end < np.inf:
+        raise Refused(f"{given}: the stretch must begin at 0 s or later and end after that")
+    if not SHORTEST_STRETCH <= stretch.end - stretch.start <= LONGEST_STRETCH:
+        raise Refused(f"{given}: it must last {SHORTEST_STRETCH:g} to {LONGEST_STRETCH:g} s")
+    return stretch
+
+
 def read_clip(path: Path, limits: Ingest, stretch: Stretch | None = None) -> np.ndarray:
     """The finished frames, uint8 RGB (frames, size, size, 3), of a raw clip; raises ``Refused``.
 
@@ -46,7 +62,7 @@ def read_clip(path: Path, limits: Ingest, stretch: Stretch | None = None) -> np.
     gap, or is slower than the output, the frame before stands again.
     """
     try:
-        frames, fresh = _resample(path, _sidecar_times(path), stretch, limits)
+        frames, fresh = _resample(path, sidecar_times(path), stretch, limits)
     except AnyviewError as error:
         raise Refused(str(error).removeprefix(f"{path}: ")) from None
     except cv2.error:
@@ -56,7 +72,7 @@ def read_clip(path: Path, limits: Ingest, stretch: Stretch | None = None) -> np.
     return frames
 
 
-def _sidecar_times(path: Path) -> np.ndarray | None:
+def sidecar_times(path: Path) -> np.ndarray | None:
     """Seconds of every frame, where a sidecar states them."""
     sidecar = path.with_name(times_file(path.name))
     if not sidecar.is_file():
@@ -84,7 +100,8 @@ def _resample(
     with open_video(path) as video:
         source = 1 / video.rate if sidecar is None else float(np.median(np.diff(sidecar)))
         tolerance = min(source, spacing)
-        for time, frame in _timed(video, sidecar, stretch, limits):
+        longest = np.inf if stretch else LONGEST * end
+        for time, frame in timed_frames(video, sidecar, start, longest):
             previous, last = max(last, start), time
             if time - previous > LONGEST_GAP / limits.rate:
                 raise Refused(f"no frame between {previous:.2f} s and {time:.2f} s")
@@ -108,15 +125,18 @@ def _resample(
     return frames, fresh
 
 
-def _timed(
-    video: Video, sidecar: np.ndarray | None, stretch: Stretch | None, limits: Ingest
+def timed_frames(
+    video: Video, sidecar: np.ndarray | None, begin: float = 0.0, longest: float = np.inf
 ) -> Iterator[tuple[float, Frame]]:
-    """Frame after frame with its time: seconds by the sidecar, else after the first frame."""
-    longest = np.inf if stretch else LONGEST * limits.frames / limits.rate
+    """Frame after frame with its time: seconds by the sidecar, else after the first frame.
+
+    Before ``begin`` frames may be missing. Raises ``Refused`` if the times make no film, or last longer than
+    ``longest``.
+    """
     deadline = monotonic() + PATIENCE
     last = -np.inf
     decoded = 0
-    for frame in video.frames(stretch.start if stretch and sidecar is None else 0.0):
+    for frame in video.frames(begin if sidecar is None else 0.0):
         if sidecar is not None and decoded == len(sidecar):
             raise Refused(f"its sidecar lists {decoded} frames, the clip has more")
         time = frame.time if sidecar is None else float(sidecar[decoded])
