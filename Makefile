@@ -35,10 +35,11 @@ test: lint .setup-stamp-graphics ## lint, type check and the fast tests
 test-slow: .setup-stamp-dev .setup-stamp-graphics .setup-stamp-browser ## kills, clusters, browsers, queues: minutes each
 	python -m pytest -m slow --durations=12
 
-lint: .setup-stamp-dev ## ruff and mypy
+lint: .setup-stamp-dev ## ruff, mypy and who may import whom
 	ruff check .
 	ruff format --check .
 	mypy
+	lint-imports --no-logo
 
 format: .setup-stamp-dev ## let ruff put the code in shape
 	ruff check --fix .
@@ -65,7 +66,7 @@ audit: .setup-stamp-dev ## known vulnerabilities and licences of what is install
 	echo "$(TORCH)" | .venv-audit/bin/pip-audit --strict --no-deps --disable-pip --requirement /dev/stdin
 
 clean: ## remove environments and caches; data, results and DVC's cache stay
-	rm -rf .venv .venv-audit .setup-stamp* .mypy_cache .pytest_cache .ruff_cache .hypothesis src/*.egg-info benchmarks/out
+	rm -rf .venv .venv-audit .setup-stamp* .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis src/*.egg-info benchmarks/out
 	find . -name __pycache__ -not -path './.dvc/*' -prune -exec rm -rf {} +
 
 # PyTorch first, by exact version; the rest by hash. PyTorch brings setuptools, so that nothing else is

@@ -13,7 +13,7 @@ import sys
 import numpy as np
 import torch
 
-from anyview.adversarial.discriminators import ClipSet, LearnedReward
+from anyview.adversarial.common.discriminators import ClipSet, LearnedReward
 from anyview.adversarial.gail import gail_reward
 from anyview.adversarial.tpil import random_motion, tpil_reward
 from anyview.analysis.statistics import bootstrap_interval
@@ -22,6 +22,7 @@ from anyview.evaluation.runs import explore
 from anyview.learners.trpo import TRPO
 from anyview.pusher.batch import ACTION_SIZE, ACTIONS, OBSERVATION_SIZE, PusherBatch
 from anyview.pusher.contexts import Context, sample_contexts
+from anyview.pusher.episodes import episode
 from anyview.pusher.expert import roll_out
 from anyview.pusher.render import renderer
 from anyview.seeds import stream
@@ -32,26 +33,25 @@ RUNS, BYSTANDERS, POINTS = 8, 10, 10
 def make_reward(method: str, params: Params, contexts: list[Context], clips: np.ndarray) -> LearnedReward:
     """The reward of ``method`` where run r's expert clip is ``clips[r]``, in the run's own context."""
     seed, imitation, runs = params.base.seed, params.imitation, range(len(contexts))
+    discriminator = params.adversarial.discriminator
     experts = [ClipSet(clips, np.array([run])) for run in runs]
     if method == "gail":
-        return gail_reward(imitation.discriminator, seed, runs, experts, imitation.trpo.batch_episodes)
+        return gail_reward(discriminator, seed, runs, experts, imitation.trpo.batch_episodes)
     repeated = [context for context in contexts for _ in range(BYSTANDERS)]
     rng = stream(seed, "benchmark")
     motion = random_motion(repeated, rng, imitation.trpo.initial_std, params.sim.control, clips.shape[2])
     rows = np.arange(len(motion)).reshape(len(contexts), BYSTANDERS)
     bystanders = [ClipSet(motion, own) for own in rows]
-    return tpil_reward(
-        imitation.discriminator, seed, runs, experts, bystanders, imitation.trpo.batch_episodes
-    )
+    return tpil_reward(discriminator, seed, runs, experts, bystanders, imitation.trpo.batch_episodes)
 
 
 def perform(pushers: PusherBatch, learner: TRPO, expert: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Mean distance (R,) of the object from where ``expert`` (R, 50, 5) has it, and final distance (R,)."""
-    observations, away = pushers.reset(), []
-    for step in range(1, ACTIONS + 1):
-        observations = pushers.step(learner.act(observations[:, None], explore=False)[:, 0])
-        away.append(np.linalg.norm(pushers.positions()[:, 3:] - expert[:, step, 3:], axis=-1))
-    return np.mean(away, axis=0), pushers.distance()
+    away = [
+        np.linalg.norm(pushers.positions()[:, 3:] - expert[:, now.step, 3:], axis=-1)
+        for now in episode(pushers, lambda now: learner.act(now.observations[:, None], explore=False)[:, 0])
+    ]
+    return np.mean(away[1:], axis=0), pushers.distance()
 
 
 def shared_context(method: str, episodes: int) -> None:

@@ -214,7 +214,8 @@ def model(name: str, folder: str) -> Callable[[Path], Target]:
     def make(box: Path) -> Target:
         import torch
 
-        from anyview.embedding.embedding import Embedding, load_embedding, save_embedding
+        from anyview.embedding.network import Embedding
+        from anyview.embedding.weights import load_embedding, save_embedding
         from anyview.learners.common.policies import load_policy, save_policies
         from anyview.pusher.contexts import sample_contexts
         from anyview.translator.network import ContextTranslator

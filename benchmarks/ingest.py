@@ -18,7 +18,7 @@ import cv2
 
 from anyview.config import load_params
 from anyview.ingest.clips import Candidate, ingest_clip
-from anyview.runtime.workers import run_units
+from anyview.runtime.workers import run_tasks
 from anyview.surrogate.film import film, plan
 
 DEMONSTRATIONS = 4  # filmed once; their clips are listed again until there are enough
@@ -57,8 +57,8 @@ def main() -> None:
         def ingest(workers: int) -> Callable[[Path], None]:
             def run(folder: Path) -> None:
                 os.environ["ANYVIEW_WORKERS"] = str(workers)
-                units = [(raw, folder, candidate, params.ingest) for candidate in candidates]
-                assert all(not verdict.reason for verdict in run_units(ingest_clip, units))
+                tasks = [(raw, folder, candidate, params.ingest) for candidate in candidates]
+                assert all(not verdict.reason for verdict in run_tasks(ingest_clip, tasks))
 
             return run
 

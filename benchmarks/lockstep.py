@@ -25,15 +25,16 @@ import torch
 from anyview.config import Params, load_params
 from anyview.environments.pusher import PusherEnv
 from anyview.environments.translated import TranslatedReward
-from anyview.evaluation.methods import Group, make_learner
 from anyview.evaluation.runs import groups_of
+from anyview.learners.common.replay import Replay
+from anyview.learners.ddpg import make_learner, minibatch_ages
 from anyview.pusher.batch import ACTION_SIZE, ACTIONS, OBSERVATION_SIZE, PusherBatch
 from anyview.pusher.contexts import Context, sample_contexts
 from anyview.pusher.expert import roll_out
 from anyview.pusher.render import renderer
 from anyview.pusher.scene import SUBSTEPS, model
 from anyview.rewards.demonstration import DemonstrationReward, translate_demonstrations
-from anyview.runtime.workers import run_units
+from anyview.runtime.workers import run_tasks
 from anyview.translator.network import ContextTranslator
 
 import mujoco.batch  # isort: skip  (after anyview.pusher, which chooses the OpenGL backend)
@@ -60,39 +61,22 @@ class Stopwatch:
         self.parts: dict[str, float] = {}
 
     @contextmanager
-    def part(self, name: str, within: str | None = None):
-        """Count for ``name``, and no longer for the part ``within`` which this one lies."""
+    def part(self, name: str):
+        """Count for ``name``."""
         started = time.perf_counter()
         yield
-        spent = time.perf_counter() - started
-        for part, share in ((name, spent), (within, -spent)):
-            if part is not None:
-                self.parts[part] = self.parts.get(part, 0.0) + share
-
-    def follow(self, owner: object, method: str, name: str, within: str) -> None:
-        """Count the calls of ``owner``'s ``method`` for ``name``."""
-        wrapped = getattr(owner, method)
-
-        def timed(*arguments):
-            with self.part(name, within):
-                return wrapped(*arguments)
-
-        setattr(owner, method, timed)
+        self.parts[name] = self.parts.get(name, 0.0) + time.perf_counter() - started
 
 
 def train_group(params: Params, runs: range, contexts: list[Context]) -> tuple[int, Stopwatch]:
     """Train ``runs`` in lockstep for EPISODES episodes after one to warm up: steps, and seconds by part."""
     torch.set_num_threads(1)
     clips = make_clips(params, contexts)
-    group = Group(params, params.imitation.cells["ours"], runs, contexts, clips[:2], clips)
-    learner, model, first = make_learner(group), make_translator(params), np.ascontiguousarray(clips[:, 0])
+    cell = params.imitation.cells["ours"]
+    learner, model, first = make_learner(params, runs), make_translator(params), clips[:, 0].copy()
     targets = translate_demonstrations(model, clips[:2], first)
-    reward = DemonstrationReward(model, *targets, first, params.imitation.reward)
+    reward = DemonstrationReward(model, *targets, first, cell.weights, cell.time_power)
     pushers, watch = PusherBatch(contexts, image_size=params.sim.image_size), Stopwatch()
-    for method in ("_transitions", "_sample"):
-        watch.follow(learner, method, "replay", within="updates")
-    for method in ("add", "take"):
-        watch.follow(learner._replay, method, "replay", within="updates")
     for episode in range(EPISODES + 1):
         if episode == 1:
             watch.parts.clear()
@@ -101,25 +85,43 @@ def train_group(params: Params, runs: range, contexts: list[Context]) -> tuple[i
             with watch.part("acting"):
                 actions = learner.act(observations, explore=True)
             with watch.part("physics"):
-                following = pushers.step(actions[:, 0])[:, None]
+                next_observations = pushers.step(actions[:, 0])[:, None]
             with watch.part("rendering"):
                 frames = pushers.render()
             with watch.part("reward (encoder)"):
                 rewards = reward.step(frames[:, None], step)
-            with watch.part("replay"):
-                learner.record(observations, actions, rewards, following, step)
-            observations = following
+            with watch.part("updates"):
+                learner.record(observations, actions, rewards, next_observations, step)
+            observations = next_observations
         with watch.part("updates"):
             learner.end_iteration()
+    replaying = EPISODES * replay_seconds(params, len(runs))
+    watch.parts |= {"replay": replaying, "updates": watch.parts["updates"] - replaying}
     return EPISODES * ACTIONS * len(runs), watch
+
+
+def replay_seconds(params: Params, runs: int) -> float:
+    """Seconds that the replay of ``runs`` takes for an episode: drawing, gathering and storing."""
+    ddpg = params.imitation.ddpg
+    width, updates = 2 * OBSERVATION_SIZE + ACTION_SIZE + 2, round(ddpg.updates_per_step * ACTIONS)
+    replay, rows = Replay(runs, ddpg.replay, width, torch.device("cpu")), torch.zeros(runs, ACTIONS, width)
+    rng = np.random.default_rng(0)
+
+    def replay_episode() -> None:
+        replay.add(rows)
+        drawn = [minibatch_ages(rng, updates, ddpg.batch_size, replay.size, replay.size) for _ in range(runs)]
+        for ages in torch.from_numpy(np.stack(drawn, axis=1)):
+            replay.take(ages)
+
+    return seconds(replay_episode, 5)
 
 
 def lockstep_rate(params: Params, contexts: list[Context]) -> float:
     """Steps per second of 15 runs in groups on two workers, setting up left out."""
     os.environ["ANYVIEW_WORKERS"] = "2"
     groups = groups_of(len(contexts))
-    units = [(params, group, [contexts[run] for run in group]) for group in groups]
-    return sum(steps / sum(watch.parts.values()) for steps, watch in run_units(train_group, units))
+    tasks = [(params, group, [contexts[run] for run in group]) for group in groups]
+    return sum(steps / sum(watch.parts.values()) for steps, watch in run_tasks(train_group, tasks))
 
 
 def stable_baselines3_rate(params: Params, contexts: list[Context], threads: int) -> float:
@@ -129,7 +131,8 @@ def stable_baselines3_rate(params: Params, contexts: list[Context], threads: int
     torch.set_num_threads(threads)
     clips = make_clips(params, contexts[:2])
     pusher = PusherEnv(contexts[0], image_size=params.sim.image_size, render_mode="rgb_array")
-    env = TranslatedReward(pusher, make_translator(params), clips, params.imitation.reward)
+    cell = params.imitation.cells["ours"]
+    env = TranslatedReward(pusher, make_translator(params), clips, cell.weights, cell.time_power)
     wanted = params.imitation.ddpg
     model = DDPG(
         "MlpPolicy",

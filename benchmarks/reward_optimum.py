@@ -21,8 +21,8 @@ from anyview.pusher.expert import roll_out
 from anyview.pusher.render import renderer
 from anyview.rewards.demonstration import translate_demonstrations
 from anyview.seeds import stream
-from anyview.translator.network import to_input
 from anyview.translator.weights import load_translator
+from anyview.video.pixels import to_input
 
 REACH = 6  # centimetres each way
 
@@ -37,6 +37,8 @@ def main() -> None:
         print(f"skipped: {options.model} does not exist; run dvc repro first")
         return
     params = load_params()
+    weights = params.imitation.cells["ours"].weights
+    phi = weights.image / weights.feature
     contexts, _ = sample_contexts(stream(params.base.seed, "tuning"), options.contexts)
     positions, _ = roll_out(contexts)
     camera = renderer(params.sim.image_size)
@@ -48,10 +50,12 @@ def main() -> None:
     steps = np.arange(-REACH, REACH + 1)
     offsets = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     away = np.linalg.norm(offsets, axis=-1)
+    weights = params.imitation.cells["ours"].weights
+    phi = weights.image / weights.feature
     costs: dict[str, list[np.ndarray]] = {
         "L_f": [],
         "L_i": [],
-        f"L_f + {params.imitation.reward.phi:g} L_i": [],
+        f"L_f + {phi:g} L_i": [],
     }
     for run, context in enumerate(contexts):
         moved = np.repeat(positions[run, -1:], len(offsets), axis=0)
@@ -62,7 +66,6 @@ def main() -> None:
             feature = _squares(model.encode_expert(seen), features[run, -1])
             feature /= _squares(model.encode_expert(still), features[run]).mean()
         image = _squares(seen, images[run, -1]) / _squares(still, images[run]).mean()
-        phi = params.imitation.reward.phi
         for name, cost in zip(costs, (feature, image, (feature + phi * image) / (1 + phi)), strict=True):
             costs[name].append(cost.numpy())
 

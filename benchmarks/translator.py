@@ -17,6 +17,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -28,14 +29,18 @@ from torch.utils.flop_counter import FlopCounterMode
 
 from anyview.config import LossWeights, Training, TranslatorCell
 from anyview.runtime.device import worker_count
-from anyview.seeds import stream, torch_seed
-from anyview.training.sampling import Dataset, training_pairs
-from anyview.training.trainer import Recipe, Trainer
+from anyview.seeds import torch_seed
+from anyview.training.common.fit import update, validate
+from anyview.training.common.optimization import SharedOptimizer
+from anyview.training.translator import TranslatorObjective
 from anyview.translator.losses import batch_losses
-from anyview.translator.network import ARCHITECTURES, ContextTranslator, to_input
+from anyview.translator.network import ARCHITECTURES, ContextTranslator
+from anyview.video.datasets import Dataset
+from anyview.video.pixels import to_input
 from anyview.video.sets import open_frames
 
 BATCH, CLIPS, LENGTH = 100, 120, 20
+THREADS = 2  # of our loop, as in training
 ONE = LossWeights(translation=1.0, reconstruction=1.0, alignment=1.0)
 
 
@@ -56,10 +61,9 @@ def make_dataset(size: int) -> Dataset:
     return Dataset("benchmark", frames, table)
 
 
-def make_recipe(architecture: str, seed: int = 0) -> Recipe:
+def make_objective(architecture: str, dataset: Dataset, seed: int = 0) -> TranslatorObjective:
     cell = TranslatorCell(
-        method="translator",
-        dataset="sim-diverse",
+        dataset="diverse",
         architecture=architecture,
         optimizer="adam",
         iterations=1000,
@@ -74,17 +78,17 @@ def make_recipe(architecture: str, seed: int = 0) -> Recipe:
         validation_every=40,
         validation_pairs=2 * BATCH,
     )
-    return Recipe("benchmark", cell, training, seed)
+    return TranslatorObjective(cell, training, seed, dataset)
 
 
 class PlainLoop:
     """The loop that the equations suggest."""
 
-    def __init__(self, recipe: Recipe, dataset: Dataset):
-        torch.manual_seed(torch_seed(recipe.seed, "translator/weights"))
-        self.model = ContextTranslator(recipe.cell.architecture, dataset.image_size)
-        self._optimizer = torch.optim.Adam(self.model.parameters(), lr=recipe.training.learning_rate)
-        self._recipe, self._dataset = recipe, dataset
+    def __init__(self, objective: TranslatorObjective):
+        torch.manual_seed(torch_seed(objective.seed, "translator/weights"))
+        self.model = ContextTranslator(objective.cell.architecture, objective.dataset.image_size)
+        self._optimizer = torch.optim.Adam(self.model.parameters(), lr=objective.training.learning_rate)
+        self._objective = objective
         self._noise = torch.Generator()
 
     def step(self, iteration: int) -> float:
@@ -97,9 +101,9 @@ class PlainLoop:
 
     def loss(self, iteration: int) -> Tensor:
         """L of the iteration's batch."""
-        pairs = training_pairs(self._dataset, stream(self._recipe.seed, "translator/pairs", iteration), BATCH)
-        paired, context = (to_input(frames).contiguous() for frames in pairs.frames(self._dataset))
-        expert, target = paired.chunk(2)
+        pairs, dataset = self._objective.batch(iteration), self._objective.dataset
+        expert, target = to_input(pairs.frames(dataset)).contiguous().chunk(2)
+        context = to_input(pairs.contexts(dataset)).contiguous()
         model, noise = self.model, self._noise
         z1 = model.encode_expert(expert, noise)
         z2, skips = model.encode_context(context, noise)
@@ -123,6 +127,24 @@ class PlainLoop:
         return x
 
 
+class FastLoop:
+    """Ours."""
+
+    def __init__(self, objective: TranslatorObjective):
+        torch.set_num_threads(1)
+        self._objective, self._model = objective, objective.network()
+        self._optimizer = SharedOptimizer(self._model.parameters(), objective.optimizer, THREADS)
+        self._validation, self._pool = objective.validation(), ThreadPoolExecutor(THREADS)
+
+    def step(self, iteration: int) -> float:
+        """One update; returns the loss."""
+        return update(self._objective, self._model, self._optimizer, iteration, self._pool)[0].item()
+
+    def validate(self) -> None:
+        """Forward passes of 2 batches."""
+        validate(self._objective, self._model, self._validation, self._pool)
+
+
 def seconds(work: Callable[[], object]) -> float:
     began = time.perf_counter()
     work()
@@ -136,11 +158,10 @@ def peak(dtype: torch.dtype, size: int = 2048) -> float:
     return 2 * size**3 / min(seconds(lambda: a @ a) for _ in range(8))
 
 
-def operations(architecture: str, dataset: Dataset) -> tuple[int, int]:
+def operations(objective: TranslatorObjective) -> tuple[int, int]:
     """Floating-point operations of the fast loop's network, forward and backward, for one batch."""
-    model = ContextTranslator(architecture, dataset.image_size)
-    pairs = training_pairs(dataset, stream(0, "count"), BATCH)
-    paired, context = (to_input(frames) for frames in pairs.frames(dataset))
+    model, pairs, dataset = objective.network(), objective.batch(0), objective.dataset
+    paired, context = to_input(pairs.frames(dataset)), to_input(pairs.contexts(dataset))
     with FlopCounterMode(display=False) as forward:
         loss = batch_losses(model, paired, context).total(ONE)
     with FlopCounterMode(display=False) as backward:
@@ -151,17 +172,17 @@ def operations(architecture: str, dataset: Dataset) -> tuple[int, int]:
 def compare_speed(architecture: str, rounds: int) -> None:
     """Print samples per second of both loops, and the fast loop's share of the peak."""
     dataset = make_dataset(48 if architecture == "real" else 64)
-    recipe = make_recipe(architecture)
-    fast, plain = Trainer(recipe, dataset), PlainLoop(recipe, dataset)
+    objective = make_objective(architecture, dataset)
+    fast, plain = FastLoop(objective), PlainLoop(objective)
     times: dict[str, list[float]] = {"fast": [], "plain": [], "forward": []}
     for number in range(rounds + 1):
         torch.set_num_threads(os.cpu_count() or 1)
         times["plain"] += [seconds(lambda n=number: plain.step(n)) for _ in range(3)]
         torch.set_num_threads(1)
         times["fast"] += [seconds(lambda n=number: fast.step(n)) for _ in range(3)]
-        times["forward"] += [seconds(lambda: fast.validate(0)) / 2 for _ in range(3)]
+        times["forward"] += [seconds(lambda: fast.validate()) / 2 for _ in range(3)]
     best = {name: min(found[3:]) for name, found in times.items()}
-    forward, backward = operations(architecture, dataset)
+    forward, backward = operations(objective)
     top = peak(torch.bfloat16)
     shares = forward / best["forward"] / top, backward / (best["fast"] - best["forward"]) / top
     print(
@@ -178,12 +199,12 @@ def compare_curves(architecture: str, iterations: int, seeds: int = 3) -> None:
     tail = max(1, iterations // 10)
     ends: dict[str, list[float]] = {"plain": [], "fast": []}
     for seed in range(seeds):
-        recipe = make_recipe(architecture, seed)
+        objective = make_objective(architecture, dataset, seed)
         torch.set_num_threads(os.cpu_count() or 1)
-        plain = PlainLoop(recipe, dataset)
+        plain = PlainLoop(objective)
         ends["plain"].append(float(np.mean([plain.step(n) for n in range(iterations)][-tail:])))
-        fast = Trainer(recipe, dataset)
-        ends["fast"].append(float(np.mean([fast.step(n)[0].item() for n in range(iterations)][-tail:])))
+        fast = FastLoop(objective)
+        ends["fast"].append(float(np.mean([fast.step(n) for n in range(iterations)][-tail:])))
     for name, found in ends.items():
         losses = " ".join(f"{loss:8.0f}" for loss in found)
         spread = np.std(found, ddof=1)

@@ -48,9 +48,9 @@ def lockstep(steps: int) -> tuple[TRPO, float]:
         observations, _ = environments.reset(seed=[reset_seed(run, episode) for run in range(RUNS)])
         for step in range(1, HORIZON + 1):
             actions = learner.act(observations[:, None], explore=True)
-            following, rewards, *_ = environments.step(actions[:, 0] * TORQUE)
-            learner.record(observations[:, None], actions, rewards[:, None], following[:, None], step)
-            observations = following
+            next_observations, rewards, *_ = environments.step(actions[:, 0] * TORQUE)
+            learner.record(observations[:, None], actions, rewards[:, None], next_observations[:, None], step)
+            observations = next_observations
         learner.end_iteration()
     return learner, time.process_time() - started
 

@@ -19,7 +19,7 @@ import numpy as np
 from anyview.pusher.contexts import sample_contexts
 from anyview.pusher.expert import roll_out
 from anyview.pusher.render import renderer
-from anyview.runtime.workers import run_units
+from anyview.runtime.workers import run_tasks
 from anyview.seeds import stream
 from anyview.video.sets import write_shard
 
@@ -47,10 +47,10 @@ def main() -> None:
         def run() -> tuple[float, list[str]]:
             os.environ |= {"ANYVIEW_BACKEND": backend, "ANYVIEW_WORKERS": str(workers)}
             with tempfile.TemporaryDirectory() as folder:
-                list(run_units(simulate, [(Path(folder), index, 1) for index in range(workers)]))
+                list(run_tasks(simulate, [(Path(folder), index, 1) for index in range(workers)]))
                 began = time.perf_counter()
-                units = [(Path(folder), index, options.demos) for index in range(options.shards)]
-                found = list(run_units(simulate, units))
+                tasks = [(Path(folder), index, options.demos) for index in range(options.shards)]
+                found = list(run_tasks(simulate, tasks))
                 return time.perf_counter() - began, found
 
         return run

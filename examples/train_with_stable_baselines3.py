@@ -7,10 +7,10 @@ evaluation uses, and prints how far from the goal the object ends.
 """
 
 import sys
-from pathlib import Path
 
 from stable_baselines3 import SAC
 
+from anyview import paths
 from anyview.config import load_params
 from anyview.environments.pusher import PusherEnv
 from anyview.environments.translated import TranslatedReward
@@ -27,9 +27,9 @@ def main(steps: int) -> None:
     pusher = PusherEnv(
         contexts[0], control=params.sim.control, image_size=params.sim.image_size, render_mode="rgb_array"
     )
-    translator = load_translator(Path("data/models/sim"))
+    translator = load_translator(paths.model("sim"))
     _, demonstrations = imitated_demonstrations(params)
-    env = TranslatedReward(pusher, translator, demonstrations, params.imitation.reward)
+    env = TranslatedReward(pusher, translator, demonstrations, params.imitation.cells["ours"].weights)
 
     model = SAC("MlpPolicy", env, gamma=0.8, learning_starts=490, seed=params.base.seed, verbose=1)
     model.learn(steps)

@@ -15,7 +15,7 @@ def notes(params: Params) -> list[str]:
         "ddpg": ("warmup_episodes", imitation.ddpg.warmup_episodes),
         "trpo": ("batch_episodes", imitation.trpo.batch_episodes),
     }
-    learners = {cell.learner for cell in imitation.cells.values()}
+    learners = {cell.learner for cell in params.methods.values()}
     return [
         f"imitation: {episodes} episodes a run (iterations x episodes_per_iteration) are fewer than "
         f"{learner}.{key} {least}: {learner.upper()} learns nothing"

@@ -1,20 +1,18 @@
 """Stage `film`: the surrogate webcam clips, as a camera would leave them."""
 
 import shutil
-from pathlib import Path
 
 import pandas as pd
 
+from anyview import paths
 from anyview.config import load_params
 from anyview.runtime.errors import AnyviewError, run_stage
 from anyview.runtime.outputs import whole_folder, write_atomically
 from anyview.runtime.progress import track
-from anyview.runtime.scratch import content_key, scratch_folder
-from anyview.runtime.workers import run_units
+from anyview.runtime.scratch import checkpoint_folder
+from anyview.runtime.workers import run_tasks
 from anyview.surrogate.film import film, plan
 from anyview.video.manifests import times_file
-
-OUTPUT = Path("data/real/surrogate")
 
 
 def main(arguments: list[str]) -> None:
@@ -23,15 +21,15 @@ def main(arguments: list[str]) -> None:
         raise AnyviewError("usage: python stages/film.py")
     params = load_params()
     wanted = params.real.film
-    scratch = scratch_folder("checkpoints", content_key(["film", params.base.seed, wanted.width]))
+    scratch = checkpoint_folder(["film", params.base.seed, wanted.width])
     demonstrations = plan(wanted.pairs, wanted.singles, wanted.extreme_pairs)
-    units = [(scratch, demonstration, wanted.width, params.base.seed) for demonstration in demonstrations]
+    tasks = [(scratch, demonstration, wanted.width, params.base.seed) for demonstration in demonstrations]
     rows: list[dict[str, str]] = []
-    with track("film", len(units)) as progress:
-        for filmed in run_units(film, units):
+    with track("film", len(tasks)) as progress:
+        for filmed in run_tasks(film, tasks):
             rows += filmed
             progress.advance()
-    with whole_folder(OUTPUT) as output:
+    with whole_folder(paths.raw("surrogate")) as output:
         for row in rows:
             for name in (row["file"], times_file(row["file"])):
                 shutil.copyfile(scratch / name, output / name)

@@ -1,18 +1,17 @@
 """Stage `ingest`: raw clips, surrogate or recorded, into small even ones, and the refused with the reason."""
 
 import shutil
-from pathlib import Path
 
+from anyview import paths
 from anyview.config import load_params
 from anyview.ingest import clips as ingest
 from anyview.runtime.errors import AnyviewError, run_stage
 from anyview.runtime.outputs import whole_folder
 from anyview.runtime.progress import track
-from anyview.runtime.scratch import content_key, scratch_folder
-from anyview.runtime.workers import run_units
+from anyview.runtime.scratch import checkpoint_folder
+from anyview.runtime.workers import run_tasks
 
-SOURCES = {"surrogate": Path("data/real/surrogate"), "recorded": Path("data/real/raw")}
-OUTPUT = Path("data/real/clips")
+OUTPUT = paths.clip_set(paths.REAL)
 
 
 def main(arguments: list[str]) -> None:
@@ -20,14 +19,14 @@ def main(arguments: list[str]) -> None:
     if arguments:
         raise AnyviewError("usage: python stages/ingest.py")
     params = load_params().real
-    source, limits = SOURCES[params.source], params.ingest
+    source, limits = paths.raw(params.source), params.ingest
     candidates = ingest.read_candidates(source)
-    scratch = scratch_folder("checkpoints", content_key(["ingest", limits.model_dump()]))
+    scratch = checkpoint_folder(["ingest", limits.model_dump()])
 
     verdicts = []
-    units = [(source, scratch, candidate, limits) for candidate in candidates]
-    with track("ingest", len(units)) as progress:
-        for verdict in run_units(ingest.ingest_clip, units):
+    tasks = [(source, scratch, candidate, limits) for candidate in candidates]
+    with track("ingest", len(tasks)) as progress:
+        for verdict in run_tasks(ingest.ingest_clip, tasks):
             verdicts.append(verdict)
             progress.advance()
     verdicts = ingest.resolve_pairs(candidates, verdicts)

@@ -1,6 +1,6 @@
 """Stage `simulate`: demonstrations of the scripted expert as lossless video shards with a manifest.
 
-Usage: python stages/simulate.py diverse|narrow
+Usage: python stages/simulate.py SET
 """
 
 import json
@@ -11,92 +11,76 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from anyview import paths
 from anyview.config import load_params
 from anyview.pusher.batch import TOLERANCE
 from anyview.pusher.contexts import Kind, sample_contexts
 from anyview.pusher.expert import roll_out
 from anyview.pusher.render import renderer
-from anyview.runtime.errors import AnyviewError, run_stage
+from anyview.runtime.errors import choose, run_stage
+from anyview.runtime.once import once
 from anyview.runtime.outputs import whole_folder, write_atomically
 from anyview.runtime.progress import track
-from anyview.runtime.scratch import content_key, scratch_folder
-from anyview.runtime.workers import run_units
+from anyview.runtime.scratch import checkpoint_folder
+from anyview.runtime.workers import run_tasks
 from anyview.seeds import stream
-from anyview.video.sets import StoredFile, stored_file, write_set, write_shard
+from anyview.video.sets import StoredFile, write_set, write_shard
 
 
 def simulate_shard(
-    folder: Path, seed: int, kind: Kind, index: int, count: int, image_size: int
+    folder: Path, seed: int, name: str, kind: Kind, index: int, count: int, image_size: int
 ) -> dict[str, Any]:
-    """Make shard ``index`` of ``count`` demonstrations in ``folder``, unless an earlier try finished it.
+    """Make shard ``index`` of the set ``name``, of ``count`` demonstrations, unless an earlier try did.
 
-    Returns its record, which lies beside it as JSON: file, rows of the manifest, acceptance rate.
+    Returns its row of files.csv, its rows of the manifest and the acceptance rate of contexts.
     """
-    record_path = folder / f"shard-{index:04d}.json"
-    if (record := _finished(folder, record_path)) is not None:
-        return record
-    contexts, acceptance = sample_contexts(stream(seed, f"demonstrations/{kind}", index), count, kind)
-    positions, distances = roll_out(contexts)
-    clips = np.stack(
-        [renderer(image_size).render_clip(*scene) for scene in zip(contexts, positions, strict=True)]
-    )
-    stored = write_shard(folder, index, clips)
-    rows = [
-        {
-            "clip": f"{kind}-{index:04d}-{position:04d}",
-            "shard": index,
-            "position": position,
-            "success": bool(distance < TOLERANCE),
-            "final_distance": float(distance),
-            "context": context.to_json(),
-        }
-        for position, (context, distance) in enumerate(zip(contexts, distances, strict=True))
-    ]
-    record = {"file": vars(stored), "rows": rows, "acceptance": acceptance}
-    write_atomically(record_path, json.dumps(record))
-    return record
 
+    def make() -> tuple[dict[str, Any], list[str]]:
+        contexts, acceptance = sample_contexts(stream(seed, f"demonstrations/{name}", index), count, kind)
+        positions, distances = roll_out(contexts)
+        camera = renderer(image_size)
+        clips = [camera.render_clip(*scene) for scene in zip(contexts, positions, strict=True)]
+        stored = write_shard(folder, index, np.stack(clips))
+        rows = [
+            {
+                "clip": f"{name}-{index:04d}-{position:04d}",
+                "shard": index,
+                "position": position,
+                "success": bool(distance < TOLERANCE),
+                "final_distance": float(distance),
+                "context": context.to_json(),
+            }
+            for position, (context, distance) in enumerate(zip(contexts, distances, strict=True))
+        ]
+        return {"file": vars(stored), "rows": rows, "acceptance": acceptance}, [stored.file]
 
-def _finished(folder: Path, record_path: Path) -> dict[str, Any] | None:
-    """The record of a shard that is whole, by its checksum."""
-    try:
-        record = json.loads(record_path.read_text())
-        expected = StoredFile(**record["file"])
-        return (
-            record
-            if stored_file(folder / expected.file, expected.clips, expected.frames) == expected
-            else None
-        )
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
+    return once(folder, f"shard-{index:04d}", make)
 
 
 def main(arguments: list[str]) -> None:
-    """Simulate one set."""
+    """Simulate one set; a killed stage continues after the last finished shard."""
     params = load_params()
-    if arguments not in (["diverse"], ["narrow"]):
-        raise AnyviewError("usage: python stages/simulate.py diverse|narrow")
-    kind: Kind = "diverse" if arguments == ["diverse"] else "narrow"
-    demos, shard = getattr(params.simulate, kind).demos, params.simulate.shard
-    values = ["simulate", params.base.seed, kind, shard, params.sim.image_size]
-    folder = scratch_folder("checkpoints", content_key(values))
+    name = choose(arguments, params.simulate.sets, "python stages/simulate.py SET")
+    wanted, shard, size = params.simulate.sets[name], params.simulate.shard, params.sim.image_size
+    folder = checkpoint_folder(["simulate", params.base.seed, name, wanted.contexts, shard, size])
 
-    counts = [min(shard, demos - first) for first in range(0, demos, shard)]
-    units = [
-        (folder, params.base.seed, kind, index, count, params.sim.image_size)
+    counts = [min(shard, wanted.demos - first) for first in range(0, wanted.demos, shard)]
+    tasks = [
+        (folder, params.base.seed, name, wanted.contexts, index, count, size)
         for index, count in enumerate(counts)
     ]
     records = []
-    with track(f"simulate {kind}", demos) as progress:
-        for record in run_units(simulate_shard, units):
+    with track(f"simulate {name}", wanted.demos) as progress:
+        for record in run_tasks(simulate_shard, tasks):
             records.append(record)
             progress.advance(record["file"]["clips"])
 
     manifest = pd.DataFrame([row for record in records for row in record["rows"]])
-    with whole_folder(Path("data/sim") / kind) as output:
-        for record in records:
-            shutil.copyfile(folder / record["file"]["file"], output / record["file"]["file"])
-        write_set(output, manifest, [StoredFile(**record["file"]) for record in records])
+    files = [StoredFile(**record["file"]) for record in records]
+    with whole_folder(paths.clip_set(name)) as output:
+        for stored in files:
+            shutil.copyfile(folder / stored.file, output / stored.file)
+        write_set(output, manifest, files)
         summary = {
             "demos": len(manifest),
             "expert_success": float(manifest["success"].mean()),

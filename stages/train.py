@@ -1,33 +1,23 @@
-"""Stage `train`: one translator cell, or the embedding of the `tcn` baseline, into data/models/<cell>.
+"""Stage `train`: one context translator, into data/models/<cell>.
 
-Usage: python stages/train.py CELL [DATASET]
+Usage: python stages/train.py CELL
 """
 
-from pathlib import Path
-
-from anyview.config import EmbeddingCell, load_params
-from anyview.runtime.errors import AnyviewError, run_stage
-from anyview.training.sampling import check_dataset
-from anyview.training.trainer import Recipe
-from anyview.training.training import train_translator
+from anyview import paths
+from anyview.config import load_params
+from anyview.runtime.errors import choose, run_stage
+from anyview.training.common.fit import fit
+from anyview.training.translator import TranslatorObjective
+from anyview.video.datasets import open_dataset
 
 
 def main(arguments: list[str]) -> None:
     """Train one cell; an interrupted training continues."""
     params = load_params()
-    cells = params.translation.cells
-    if len(arguments) not in (1, 2) or arguments[0] not in cells:
-        raise AnyviewError(f"usage: python stages/train.py CELL, where CELL is one of {', '.join(cells)}")
-    name = arguments[0]
-    cell = cells[name]
-    check_dataset(name, cell.dataset, arguments[1:])
-    output = Path("data/models") / name
-    if isinstance(cell, EmbeddingCell):
-        from anyview.embedding.embedding import train_embedding
-
-        train_embedding(name, cell, params.translation.training, params.base.seed, output)
-    else:
-        train_translator(Recipe(name, cell, params.translation.training, params.base.seed), output)
+    name = choose(arguments, params.translators, "python stages/train.py CELL")
+    cell = params.translators[name]
+    objective = TranslatorObjective(cell, params.training, params.base.seed, open_dataset(cell.dataset))
+    fit(name, objective, paths.model(name))
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ from anyview.runtime.graphics import load_mujoco
 from tests.long_stages import LONG_STAGES, change, digests
 
 ROOT = Path(__file__).parents[1]
+pytest_plugins = ("tests.expert_clips", "tests.small_trainings")  # fixtures of several folders
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 load_mujoco()

@@ -18,17 +18,17 @@ class LongStage(NamedTuple):
 LONG_STAGES = {
     "simulate": LongStage(
         ["stages/simulate.py", "diverse"],
-        "data/sim/diverse",
-        {"simulate.diverse.demos": 120, "simulate.shard": 6},
+        "data/clips/diverse",
+        {"simulate.sets.diverse.demos": 120, "simulate.shard": 6},
     ),
     "film": LongStage(
-        ["stages/film.py"], "data/real/surrogate", {"real.film.pairs": 4, "real.film.extreme_pairs": 1}
+        ["stages/film.py"], "data/raw/surrogate", {"real.film.pairs": 4, "real.film.extreme_pairs": 1}
     ),
-    "ingest": LongStage(["stages/ingest.py"], "data/real/clips", {"real.ingest.frames": 60}),
+    "ingest": LongStage(["stages/ingest.py"], "data/clips/real", {"real.ingest.frames": 60}),
     "train": LongStage(
         ["stages/train.py", "sim"],
         "data/models/sim",
-        {"translation.cells.sim.iterations": 120, "translation.training.validation_every": 10},
+        {"translators.sim.iterations": 120, "training.validation_every": 10},
     ),
     "imitate": LongStage(
         ["stages/imitate.py", "ours"],

@@ -62,24 +62,38 @@ def test_the_committed_params_are_sound():
         ("base.seed", -1, "base.seed: Input should be greater than or equal to 0, got -1"),
         ("base.sead", 1, "base.sead: unknown key"),
         (
-            "imitation.cells.ours.source",
-            "data/models/nosuch",
-            "imitation.cells.ours.source: for the reward translated",
+            "imitation.cells.ours.model",
+            "nosuch",
+            "imitation.cells.ours.model: 'nosuch' is none of these: real-adam, ",
         ),
         (
-            "imitation.cells.ours.source",
-            "data/models/tcn",
-            "imitation.cells.ours.source: for the reward translated",
+            "imitation.cells.ours.model",
+            "tcn",
+            "imitation.cells.ours.model: 'tcn' is none of these: real-adam",
+        ),
+        ("imitation.cells.tcn.model", "sim", "imitation.cells.tcn.model: 'sim' is none of these: tcn"),
+        ("imitation.dataset", "real", "imitation.dataset: 'real' is none of these: diverse, narrow"),
+        (
+            "translators.sim.dataset",
+            "wide",
+            "translators.sim.dataset: 'wide' is none of these: diverse, narrow",
+        ),
+        ("split.wide", {"validation": 0.1}, "split.wide: 'wide' is none of these: diverse, narrow, real"),
+        ("simulate.sets", {"wide": {"contexts": "diverse", "demos": 4}}, "split.wide: missing key"),
+        (
+            "simulate.sets.real",
+            {"contexts": "diverse", "demos": 4},
+            "simulate.sets.real: the name is taken by the clips that stage ingest makes",
         ),
         (
-            "imitation.cells.tcn.source",
-            "data/models/sim",
-            "imitation.cells.tcn.source: for the reward embedding it must be data/models/tcn, got 'data",
+            "embeddings.sim",
+            VALUES["embeddings"]["tcn"],
+            "embeddings.sim: the name is taken by translators",
         ),
         (
-            "imitation.cells.gail.source",
-            "src/anyview/adversarial/tpil.py",
-            "imitation.cells.gail.source: for the reward gail it must be src/anyview/adversarial/gail.py",
+            "adversarial.cells.ours",
+            {"learner": "trpo", "reward": "gail"},
+            "adversarial.cells.ours: the name is taken by imitation.cells",
         ),
         (
             "split.real",
@@ -87,12 +101,16 @@ def test_the_committed_params_are_sound():
             "split.real: the fractions train and validation sum to more than 1",
         ),
         (
-            "simulate.diverse.demos",
+            "simulate.sets.diverse.demos",
             "many",
-            "simulate.diverse.demos: Input should be a valid integer, got 'many'",
+            "simulate.sets.diverse.demos: Input should be a valid integer, got 'many'",
         ),
         ("simulate.shard", 10**20, "simulate.shard: no machine can do more than ten million"),
-        ("simulate.diverse.demos", True, "simulate.diverse.demos: Input should be a valid integer, got True"),
+        (
+            "simulate.sets.diverse.demos",
+            True,
+            "simulate.sets.diverse.demos: Input should be a valid integer, got True",
+        ),
         ("sim.image_size", 65, "sim.image_size: Input should be 32, 64 or 128, got 65"),
         ("imitation.ddpg.discount", 1.0, "imitation.ddpg.discount: Input should be less than 1, got 1.0"),
         (
@@ -100,29 +118,38 @@ def test_the_committed_params_are_sound():
             "ppo",
             "imitation.cells.ours.learner: Input should be 'ddpg' or 'trpo'",
         ),
-        ("translation.cells.sim.iterations", 0, "translation.cells.sim.iterations: Input should be greater"),
+        ("translators.sim.iterations", 0, "translators.sim.iterations: Input should be greater"),
         (
             "real.film.width",
             100_000,
             "real.film.width: Input should be less than or equal to 1920, got 100000",
         ),
         ("sim", None, "sim: Input should be a valid dictionary"),
-        ("split.sim.validation", 0.0, "split.sim.validation: Input should be greater than 0, got 0.0"),
+        (
+            "split.diverse.validation",
+            0.0,
+            "split.diverse.validation: Input should be greater than 0, got 0.0",
+        ),
         ("real.ingest.rate", math.inf, "real.ingest.rate: Input should be a finite number, got inf"),
         (
-            "imitation.cells.tpil.learner",
+            "adversarial.cells.tpil.learner",
             "ddpg",
-            "imitation.cells.tpil.reward: learns from the batches of trpo, not of ddpg, got 'tpil'",
+            "adversarial.cells.tpil.learner: Input should be 'trpo', got 'ddpg'",
         ),
         (
-            "imitation.cells.no-image-reward.reads",
-            "reward",
-            "imitation.cells.no-image-reward.reads: must be 'reward.time_power' for this reward",
+            "imitation.cells.ours.weights",
+            {"feature": 0.0, "image": 0.0},
+            "imitation.cells.ours.weights: at least one weight must be above 0",
         ),
         (
-            "imitation.reward.phi",
-            0.0,
-            "imitation.cells: no-feature-reward has no feature reward, and imitation.reward.phi 0 leaves",
+            "imitation.cells.ours.weights.feature",
+            -1.0,
+            "imitation.cells.ours.weights.feature: Input should be greater than or equal to 0, got -1.0",
+        ),
+        (
+            "imitation.cells.ours.reward",
+            "gail",
+            "imitation.cells.ours.reward: Input should be 'translated', 'true' or 'embedding'",
         ),
         ("real.ingest.frames", 10**6, "real.ingest.frames: Input should be less than or equal to 10000"),
     ],
@@ -134,17 +161,27 @@ def test_an_impossible_value_is_named(path, value, said):
     assert "\n" not in str(caught.value)
 
 
+def test_a_name_that_is_no_folder_s_is_refused():
+    values = copy.deepcopy(VALUES)
+    values["translators"]["../sim"] = values["translators"]["sim"]
+    with pytest.raises(AnyviewError, match=r"^params.yaml: translators.../sim: String should match pattern"):
+        parse_params(values)
+
+
 def test_a_missing_key_is_named():
     values = copy.deepcopy(VALUES)
-    del values["imitation"]["reward"]["phi"]
-    with pytest.raises(AnyviewError, match=r"^params.yaml: imitation.reward.phi: missing key$"):
+    del values["imitation"]["cells"]["ours"]["time_power"]
+    with pytest.raises(AnyviewError, match=r"^params.yaml: imitation.cells.ours.time_power: missing key$"):
         parse_params(values)
 
 
 def test_of_a_misspelt_key_the_wrong_name_is_said_and_not_the_right_one():
     values = copy.deepcopy(VALUES)
-    values["imitation"]["reward"]["phy"] = values["imitation"]["reward"].pop("phi")
-    with pytest.raises(AnyviewError, match=r"imitation.reward.phy: unknown key \(and 1 more\)$"):
+    weights = values["imitation"]["cells"]["ours"]["weights"]
+    weights["imgae"] = weights.pop("image")
+    with pytest.raises(
+        AnyviewError, match=r"imitation.cells.ours.weights.imgae: unknown key \(and 1 more\)$"
+    ):
         parse_params(values)
 
 

@@ -10,9 +10,9 @@ import pytest
 import typer
 from dvc.cli import parse_args
 
-from anyview.cli.main import main as cli
+from anyview.cli.main import app
 from anyview.config import load_params
-from anyview.report.review import flat
+from anyview.review.results import flat
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = sorted(
@@ -102,7 +102,7 @@ def test_keys_of_params_exist(path):
     text = path.read_text(encoding="utf-8")
     named = re.findall(rf"`((?:{'|'.join(params)})\.[\w.-]+[\w])(?:: [^`]*)?`", prose(path))
     named += re.findall(r"-S '?([\w.-]+)=", text)
-    unknown = {"imitation.reward.phy"} | ({name for name in named if name.endswith(".py")})
+    unknown = {"imitation.phy"} | ({name for name in named if name.endswith(".py")})
     assert {name for name in named if "<" not in name} - keys - blocks - unknown == set()
 
 
@@ -164,7 +164,7 @@ def understood_by_dvc(arguments: list[str]) -> None:
 
 
 def understood_by_anyview(arguments: list[str]) -> None:
-    group = typer.main.get_command(cli.app)
+    group = typer.main.get_command(app)
     if not arguments or arguments[0].startswith("-"):
         return
     command = group.get_command(None, arguments[0])

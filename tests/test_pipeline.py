@@ -38,9 +38,9 @@ def test_the_second_run_has_nothing_to_do(smoke):
 def test_every_stage_left_its_outputs(smoke):
     params = load_params(smoke.folder / "params.yaml")
     for folder, cells in {
-        "sim": ["diverse", "narrow"],
-        "models": params.translation.cells,
-        "policies": params.imitation.cells,
+        "clips": params.split,
+        "models": [*params.translators, *params.embeddings],
+        "policies": params.methods,
     }.items():
         for cell in cells:
             assert any((smoke.folder / "data" / folder / cell).iterdir()), cell
@@ -117,7 +117,7 @@ def test_what_no_stage_reads_is_checked_as_well(smoke, tmp_path, before, after, 
 
 
 def test_metrics_are_plain_rounded_numbers(metrics):
-    assert metrics.keys() == {"data", "translation", "imitation"}
+    assert metrics.keys() == {"summary", "data", "translation", "imitation"}
     for name, value in leaves(metrics):
         assert isinstance(value, int | float), name
         assert not isinstance(value, bool), name
@@ -136,10 +136,8 @@ def test_metrics_of_data(metrics):
 
 
 def test_metrics_of_translation(smoke, metrics):
-    cells = load_params(smoke.folder / "params.yaml").translation.cells
-    assert metrics["translation"].keys() == {
-        name for name, cell in cells.items() if cell.method == "translator"
-    }
+    cells = load_params(smoke.folder / "params.yaml").translators
+    assert metrics["translation"].keys() == cells.keys()
     for name, values in metrics["translation"].items():
         assert values.keys() >= {"iterations", "best_iteration", "surrogate", "validation"}
         assert values["iterations"] == 4
@@ -153,7 +151,7 @@ def test_metrics_of_translation(smoke, metrics):
 
 
 def test_metrics_of_imitation(smoke, metrics):
-    cells = load_params(smoke.folder / "params.yaml").imitation.cells
+    cells = load_params(smoke.folder / "params.yaml").methods
     assert metrics["imitation"].keys() == cells.keys()
     for name, values in metrics["imitation"].items():
         assert values["runs"] == 2

@@ -18,7 +18,7 @@ EXIT_CODES = {signal.SIGKILL: -signal.SIGKILL, signal.SIGTERM: 130, signal.SIGIN
 
 
 def checkpoints(scratch: Path) -> list[Path]:
-    """Finished checkpoints and units of work."""
+    """Finished checkpoints and tasks."""
     return [path for path in scratch.rglob("checkpoints/*/*") if "partial" not in path.name]
 
 
@@ -39,7 +39,7 @@ def stop(process: subprocess.Popen[str], number: signal.Signals) -> str:
 
 @pytest.fixture
 def begun(study) -> Callable[..., subprocess.Popen[str]]:
-    """Starts a command by two workers, with a checkpoint after every unit of work."""
+    """Starts a command by two workers, with a checkpoint after every task."""
 
     def start(*command: str) -> subprocess.Popen[str]:
         return study.start(*command, ANYVIEW_CHECKPOINT_SECONDS="0", ANYVIEW_WORKERS="2")
@@ -100,7 +100,7 @@ def test_changed_code_starts_afresh(study, begun):
     change(study.folder, stage.params)
     for number in (1, 2):
         process = begun("python", *stage.command)
-        while len(list(study.scratch.glob("checkpoints/*"))) < number:
+        while len(list(study.scratch.glob("checkpoints/*/"))) < number:
             assert process.poll() is None, process.communicate()
             time.sleep(0.02)
         if number == 1:

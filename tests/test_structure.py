@@ -3,6 +3,7 @@
 import ast
 import importlib.metadata
 import re
+import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
@@ -18,35 +19,8 @@ from anyview.config import load_params
 ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "src"
 
-# What a package may import beside itself. Every package may import runtime and config.
-ALLOWED = {
-    "runtime": set(),
-    "sim": set(),
-    "clips": set(),
-    "translation": {"clips"},
-    "imitation": {"clips", "translation", "sim"},
-    "report": {"clips", "translation", "imitation", "sim"},
-}
-
-# Modules that serve a stage without changing what it makes: an edit of theirs must not retrain anything.
-SERVANTS = {
-    "src/anyview/config.py",
-    *(
-        f"src/anyview/runtime/{name}.py"
-        for name in (
-            "checkpoints",
-            "device",
-            "errors",
-            "graphics",
-            "once",
-            "outputs",
-            "parent",
-            "progress",
-            "scratch",
-            "workers",
-        )
-    ),
-}
+# Code that serves a stage without changing what it makes: an edit of it must not retrain anything.
+WITHOUT_EFFECT_ON_RESULTS = ("src/anyview/config.py", "src/anyview/paths.py", "src/anyview/runtime/")
 
 
 def parse(path: Path) -> list[ast.AST]:
@@ -106,29 +80,11 @@ MODULES = sorted(SOURCE.rglob("*.py"))
 STAGES = sorted((ROOT / "stages").glob("*.py"))
 
 
-def package(path: Path) -> str:
-    """The package below ``anyview`` that a file belongs to ("" for the top)."""
-    parts = path.relative_to(SOURCE / "anyview").parts
-    return parts[0] if len(parts) > 1 else ""
-
-
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(SOURCE)))
-def test_dependencies_point_one_way(path):
-    here = package(path)
-    if not here:
-        return  # the command line and its helpers stand above all packages
-    others = {file for file in our_imports(path) if package(file) != here}
-    top = {file.stem for file in others if not package(file)} - {"__init__"}
-    assert top <= ({"config"} if here != "runtime" else set())
-    assert {package(file) for file in others} - {"", "runtime"} <= ALLOWED[here]
-
-
-def test_no_module_imports_itself_round_a_corner():
-    for path in MODULES:
-        for found in our_imports(path) - {path}:
-            assert str(path.relative_to(ROOT)) not in reached_from(found) or path.name == "__init__.py", (
-                f"{path.relative_to(SOURCE)} and {found.relative_to(SOURCE)} import each other"
-            )
+def test_imports_point_one_way():
+    """By the contracts in pyproject.toml, which `make lint` checks too."""
+    command = [Path(sys.executable).parent / "lint-imports", "--no-logo", "--no-cache"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
 
 
 def test_every_import_is_declared():
@@ -168,31 +124,72 @@ def declared() -> dict[str, tuple[set[str], set[str]]]:
 
 
 def code_of(stage: str) -> dict[str, set[str]]:
-    """Code that the cells of ``stage`` declare."""
+    """Code that the cells of ``stage`` declare, files and folders."""
     cells = {name: deps for name, (deps, _) in declared().items() if name.split("@")[0] == stage}
     assert cells, f"{stage}: not in dvc.yaml"
-    return {name: {dep for dep in deps if dep.endswith(".py")} for name, deps in cells.items()}
+    other = ("data/", "params.yaml", "stages/pipeline.yaml")
+    return {name: {dep for dep in deps if not dep.startswith(other)} for name, deps in cells.items()}
+
+
+def test_the_report_depends_on_the_pipeline_that_it_draws():
+    """By a link: DVC does not take dvc.yaml itself for a dependency."""
+    assert "stages/pipeline.yaml" in declared()["report"][0]
+    assert (ROOT / "stages/pipeline.yaml").resolve() == ROOT / "dvc.yaml"
+
+
+def covers(dependency: str, file: str) -> bool:
+    """Whether an edit of ``file`` is an edit of ``dependency``, a file or a folder."""
+    return file == dependency or file.startswith(f"{dependency}/")
 
 
 @pytest.mark.parametrize("stage", [path.stem for path in STAGES])
 def test_a_stage_depends_on_the_code_that_it_runs(stage):
-    """No edit goes unnoticed, and none reruns a stage that does not use it.
+    """No edit goes unnoticed, and no folder is declared that the stage does not use.
 
     Cells may differ where each runs code of its own (a learner, a reward); together they name all of it.
     """
     reached = {
         file
         for file in reached_from(ROOT / "stages" / f"{stage}.py")
-        if file not in SERVANTS and not file.endswith("__init__.py")
+        if not file.startswith(WITHOUT_EFFECT_ON_RESULTS) and not file.endswith("__init__.py")
     }
     cells = code_of(stage)
-    assert set().union(*cells.values()) == reached
+    together = set().union(*cells.values())
+    assert {file for file in reached if not any(covers(dependency, file) for dependency in together)} == set()
+    assert {dep for dep in together if not any(covers(dep, file) for file in reached)} == set()
     for name, code in cells.items():
         assert f"stages/{stage}.py" in code, name
 
 
-def test_servants_exist():
-    assert [name for name in SERVANTS if not (ROOT / name).is_file()] == []
+def rerun_by(file: str) -> set[str]:
+    """Stages that an edit of ``file`` reruns, by dvc.yaml, with those behind them."""
+    stages = {address: deps for address, (deps, _) in declared().items()}
+    found = {address for address, deps in stages.items() if any(covers(dep, file) for dep in deps)}
+    assert (ROOT / file).is_file()
+    while True:
+        outputs = {out for address in found for out in declared()[address][1]}
+        behind = {address for address, deps in stages.items() if deps & outputs} - found
+        if not behind:
+            return found
+        found |= behind
+
+
+def test_an_edit_reruns_no_more_than_it_must():
+    """Where a rerun takes minutes, dependencies are finer than folders."""
+    learners = {name: cell.learner for name, cell in load_params(ROOT / "params.yaml").methods.items()}
+    for learner, other in (("ddpg", "trpo"), ("trpo", "ddpg")):
+        again = {name.partition("@")[2] for name in rerun_by(f"src/anyview/learners/{learner}.py")} - {""}
+        assert {learners[name] for name in again} == {learner}
+        assert other not in {learners[name] for name in again}
+    for reward in ("gail", "tpil"):
+        assert rerun_by(f"src/anyview/adversarial/{reward}.py") == {f"discriminate@{reward}", "report"}
+    embedded = {name.split("@")[0] for name in rerun_by("src/anyview/training/embedding.py")}
+    assert embedded == {"embed", "imitate", "report"}
+    assert not {name for name in rerun_by("src/anyview/training/translator.py") if name.startswith("embed@")}
+    assessed = rerun_by("src/anyview/assessment/similarity.py")
+    assert {name.split("@")[0] for name in assessed} == {"translate", "report"}
+    for folder in ("report", "analysis"):
+        assert rerun_by(f"src/anyview/{folder}/__init__.py") == {"report"}
 
 
 def test_every_stage_has_a_script_and_every_script_a_stage():
@@ -201,21 +198,23 @@ def test_every_stage_has_a_script_and_every_script_a_stage():
 
 def test_cells_are_those_of_params():
     params = load_params(ROOT / "params.yaml")
-    translators = {name for name, cell in params.translation.cells.items() if cell.method == "translator"}
     cells: dict[str, set[str]] = {}
     for address in declared():
         stage, _, cell = address.partition("@")
         cells.setdefault(stage, set()).add(cell)
-    assert cells["train"] == set(params.translation.cells)
-    assert cells["translate"] == translators
+    assert cells["simulate"] == set(params.simulate.sets)
+    assert cells["split"] == set(params.split)
+    assert cells["train"] == cells["translate"] == set(params.translators)
+    assert cells["embed"] == set(params.embeddings)
     assert cells["imitate"] == set(params.imitation.cells)
+    assert cells["discriminate"] == set(params.adversarial.cells)
 
 
 def test_the_report_reads_every_cell():
     """Its inputs are written out one by one: none may be forgotten, and none may be left over."""
     outputs = {out for address, (_, outs) in declared().items() if address != "report" for out in outs}
     data = {dep for dep in declared()["report"][0] if dep.startswith("data/")}
-    assert outputs - data <= {"data/real/surrogate"}
+    assert outputs - data <= {"data/raw/surrogate"}
     assert data <= outputs
 
 
@@ -225,7 +224,7 @@ def test_outputs_are_one_folder_or_table_a_cell():
     assert len(outputs) == len(set(outputs))
     for address, (deps, _) in declared().items():
         for dep in deps:
-            if dep.startswith("data/") and dep != "data/real/raw":
+            if dep.startswith("data/") and dep != "data/raw/recorded":
                 assert Path(dep) in outputs, f"{address}: {dep}"
 
 

@@ -1,6 +1,7 @@
 """``params.yaml`` as strict typed models: an unknown or impossible key is refused by its dotted name."""
 
 import reprlib
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -9,14 +10,14 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
+    StringConstraints,
     ValidationError,
-    ValidationInfo,
-    field_validator,
     model_validator,
 )
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
+from anyview.paths import REAL
 from anyview.runtime.errors import AnyviewError
 
 
@@ -39,6 +40,7 @@ Positive = Annotated[float, Field(gt=0)]
 CountOrFraction = Annotated[float, Field(gt=0), AfterValidator(_count_or_fraction)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
 Discount = Annotated[float, Field(ge=0, lt=1)]
+Name = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9_-]{0,63}$")]  # of a folder, too
 
 
 class Block(BaseModel):
@@ -65,6 +67,9 @@ class Sim(Block):
 class DemonstrationSet(Block):
     """One set of simulated demonstrations."""
 
+    contexts: Literal["diverse", "narrow"] = Field(
+        description="`diverse`: seen from anywhere, with distractors; `narrow`: from four sides, without"
+    )
     demos: Count = Field(description="demonstrations to render")
 
 
@@ -72,8 +77,7 @@ class Simulate(Block):
     """Stage `simulate`: the simulated demonstrations."""
 
     shard: Count = Field(description="demonstrations in one video shard")
-    diverse: DemonstrationSet
-    narrow: DemonstrationSet
+    sets: dict[Name, DemonstrationSet]
 
 
 class Film(Block):
@@ -100,38 +104,26 @@ class Real(Block):
     """Real clips: where they come from and how they are brought into shape."""
 
     source: Literal["surrogate", "recorded"] = Field(
-        description="`surrogate`: rendered stand-ins; `recorded`: your own clips in data/real/raw"
+        description="`surrogate`: rendered stand-ins; `recorded`: your own clips in data/raw/recorded"
     )
     film: Film
     ingest: Ingest
 
 
-class SplitSim(Block):
-    """Split of a simulated set."""
+class SplitSet(Block):
+    """Split of one set of clips, by pair. Counts that the clips cannot fill are taken as proportions."""
 
-    validation: CountOrFraction = Field(
-        description="demonstrations held out: a count, or a fraction such as 0.1"
+    train: CountOrFraction | None = Field(
+        default=None,
+        description="clips to train on: a count, a fraction such as 0.85, or without it all that are left",
     )
-
-
-class SplitReal(Block):
-    """Split of the real clips, by pair. Counts that the data cannot fill are taken as proportions."""
-
-    train: CountOrFraction = Field(description="clips to train on: a count, or a fraction such as 0.85")
-    validation: CountOrFraction = Field(description="clips held out: a count, or a fraction")
+    validation: CountOrFraction = Field(description="clips held out: a count, or a fraction such as 0.1")
 
     @model_validator(mode="after")
-    def _fractions_of_one_whole(self) -> "SplitReal":
-        if self.train < 1 and self.validation < 1 and self.train + self.validation > 1:
+    def _fractions_of_one_whole(self) -> "SplitSet":
+        if self.train is not None and self.train < 1 and self.validation < 1 < self.train + self.validation:
             raise ValueError("the fractions train and validation sum to more than 1")
         return self
-
-
-class Split(Block):
-    """Stage `split`."""
-
-    sim: SplitSim
-    real: SplitReal
 
 
 class LossWeights(Block):
@@ -149,10 +141,9 @@ class LossWeights(Block):
 
 
 class TranslatorCell(Block):
-    """One translator to train."""
+    """Stage `train`: one context translator."""
 
-    method: Literal["translator"]
-    dataset: Literal["sim-diverse", "sim-narrow", "real"]
+    dataset: str = Field(description="set of clips to learn from")
     architecture: Literal["real", "sim", "compact"]
     optimizer: Literal["adam", "adadelta"]
     iterations: Count
@@ -161,17 +152,16 @@ class TranslatorCell(Block):
 
 
 class EmbeddingCell(Block):
-    """The time-contrastive embedding of the `tcn` baseline."""
+    """Stage `embed`: one time-contrastive embedding, for the `tcn` baseline."""
 
-    method: Literal["time-contrastive"]
-    dataset: Literal["sim-diverse", "sim-narrow", "real"]
+    dataset: str = Field(description="set of clips to learn from")
     iterations: Count
     dimensions: Count = Field(description="size of the embedding")
     margin: Positive = Field(description="triplet margin")
 
 
 class Training(Block):
-    """Shared by every translator cell."""
+    """Stages `train` and `embed`: shared by every cell."""
 
     batch_size: Count
     learning_rate: Positive
@@ -185,30 +175,12 @@ class Training(Block):
     validation_pairs: Count = Field(description="frame pairs in the fixed validation set")
 
 
-class Evaluation(Block):
-    """Stage `translate`, shared by every translator cell."""
+class Assessment(Block):
+    """Stage `translate`: shared by every translator."""
 
     clips: Count = Field(description="validation clips that are translated, at most")
     shown: Count = Field(description="clips of each split drawn as strips and written as videos, at most")
     permutations: Count = Field(description="other times that stand in for a frame when it is weighted")
-
-
-class Translation(Block):
-    """Stages `train` and `translate`."""
-
-    training: Training
-    evaluation: Evaluation
-    cells: dict[str, Annotated[TranslatorCell | EmbeddingCell, Field(discriminator="method")]]
-
-
-class Reward(Block):
-    """The translated demonstration's reward (equations 20 to 22)."""
-
-    phi: NonNegative = Field(
-        description="weight of L_i beside L_f, each in units of what standing still costs"
-    )
-    time_power: NonNegative = Field(description="reward at step t is weighted by (t/49) to this power")
-    demonstrations: Count = Field(description="demonstrations whose translations are averaged")
 
 
 class DDPG(Block):
@@ -258,72 +230,70 @@ class Discriminator(Block):
     domain_weight: NonNegative = Field(description="gradient reversal of TPIL's domain head")
 
 
-_LEARNED = ("gail", "tpil")  # rewards that train on what the agent does
+class RewardWeights(Block):
+    """Weights of a reward's terms, each in units of what standing still costs; 0 leaves a term out."""
 
-
-class ImitationCell(Block):
-    """One method to evaluate."""
-
-    learner: Literal["ddpg", "trpo"]
-    reward: Literal["translated", "true", "embedding", "tpil", "gail"]
-    source: str = Field(
-        description="what the reward is made from: a model folder, or the discriminator's module"
-    )
-    feature: bool = Field(description="use the feature reward L_f")
-    image: bool = Field(description="use the image reward L_i")
-    reads: Literal["reward", "reward.time_power", "discriminator"] = Field(
-        description="the part of `imitation` that the reward reads: the cell is run again when it changes"
-    )
-
-    @field_validator("reward")
-    @classmethod
-    def _has_batches(cls, reward: str, info: ValidationInfo) -> str:
-        learner = info.data.get("learner")
-        if reward in _LEARNED and learner not in ("trpo", None):
-            raise ValueError(f"learns from the batches of trpo, not of {learner}")
-        return reward
-
-    @field_validator("reads")
-    @classmethod
-    def _reads_what_the_reward_does(cls, reads: str, info: ValidationInfo) -> str:
-        reward, both = info.data.get("reward"), info.data.get("feature") and info.data.get("image")
-        weighed = reward in ("translated", "true") and both
-        expected = "discriminator" if reward in _LEARNED else "reward" if weighed else "reward.time_power"
-        if info.data.keys() >= {"reward", "feature", "image"} and reads != expected:
-            raise ValueError(f"must be {expected!r} for this reward")
-        return reads
+    feature: NonNegative = Field(description="of L_f, the distance of features")
+    image: NonNegative = Field(description="of L_i, the distance of pixels: phi where `feature` is 1")
 
     @model_validator(mode="after")
-    def _some_reward(self) -> "ImitationCell":
-        if not (self.feature or self.image):
-            raise ValueError("feature and image are both false: there is no reward left")
+    def _some_term(self) -> "RewardWeights":
+        if self.feature == self.image == 0:
+            raise ValueError("at least one weight must be above 0")
         return self
 
 
-class Imitation(Block):
-    """Stage `imitate`: policies and their evaluation."""
+class DemonstrationCell(Block):
+    """One method rewarded by a demonstration in the agent's own view (equations 20 to 22)."""
 
+    learner: Literal["ddpg", "trpo"]
+    reward: Literal["translated", "true"] = Field(
+        description="what is matched: the translated demonstrations, or the true one (the oracle)"
+    )
+    model: str = Field(description="the translator: a cell of `translators`")
+    weights: RewardWeights
+    time_power: NonNegative = Field(description="reward at step t is weighted by (t/49) to this power")
+
+
+class EmbeddingRewardCell(Block):
+    """One method rewarded by the distance to demonstrations in an embedding, which nothing translates."""
+
+    learner: Literal["ddpg", "trpo"]
+    reward: Literal["embedding"]
+    model: str = Field(description="the embedding: a cell of `embeddings`")
+    time_power: NonNegative = Field(description="reward at step t is weighted by (t/49) to this power")
+
+
+ImitationCell = DemonstrationCell | EmbeddingRewardCell
+
+
+class Imitation(Block):
+    """Stage `imitate`: policies and their evaluation. `discriminate` shares all but the cells."""
+
+    dataset: str = Field(description="simulated set whose held-out clips are imitated")
+    demonstrations: Count = Field(description="clips that are imitated, the same for every run and method")
     runs: Count = Field(description="contexts, each with a policy of its own")
     iterations: Count
     episodes_per_iteration: Count = Field(
         description="episodes of 49 steps that each run acts in an iteration"
     )
-    reward: Reward
     ddpg: DDPG
     trpo: TRPO
-    discriminator: Discriminator
-    cells: dict[str, ImitationCell]
+    cells: dict[Name, Annotated[ImitationCell, Field(discriminator="reward")]]
 
-    @field_validator("cells")
-    @classmethod
-    def _phi_leaves_a_reward(
-        cls, cells: dict[str, ImitationCell], info: ValidationInfo
-    ) -> dict[str, ImitationCell]:
-        reward = info.data.get("reward")
-        for name, cell in cells.items():
-            if reward is not None and reward.phi == 0 and not cell.feature:
-                raise ValueError(f"{name} has no feature reward, and imitation.reward.phi 0 leaves no other")
-        return cells
+
+class AdversarialCell(Block):
+    """One method whose reward a discriminator learns while the agent does."""
+
+    learner: Literal["trpo"] = Field(description="discriminators learn from the batches of trpo")
+    reward: Literal["tpil", "gail"]
+
+
+class Adversarial(Block):
+    """Stage `discriminate`: TPIL and GAIL, with the runs and learners of `imitation`."""
+
+    discriminator: Discriminator
+    cells: dict[Name, AdversarialCell]
 
 
 class Params(Block):
@@ -333,9 +303,18 @@ class Params(Block):
     sim: Sim
     simulate: Simulate
     real: Real
-    split: Split
-    translation: Translation
+    split: dict[Name, SplitSet]
+    training: Training
+    translators: dict[Name, TranslatorCell]
+    embeddings: dict[Name, EmbeddingCell]
+    assessment: Assessment
     imitation: Imitation
+    adversarial: Adversarial
+
+    @property
+    def methods(self) -> dict[str, DemonstrationCell | EmbeddingRewardCell | AdversarialCell]:
+        """Every method that is evaluated, by its cell's name."""
+        return {**self.imitation.cells, **self.adversarial.cells}
 
 
 def read_yaml(path: Path) -> Any:
@@ -356,12 +335,11 @@ def parse_params(values: Any, name: str = "params.yaml") -> Params:
         params = Params.model_validate(values)
     except ValidationError as error:
         raise AnyviewError(f"{name}: {_explain(error)}") from None
-    for key, cell in params.imitation.cells.items():
-        if cell.source not in (fitting := _sources(cell, params.translation)):
-            raise AnyviewError(
-                f"{name}: imitation.cells.{key}.source: for the reward {cell.reward} it must be "
-                f"{' or '.join(fitting)}, got {_brief(cell.source)}"
-            )
+    _refuse_twins(params, name)
+    for key, found, fitting in _references(params):
+        if found not in fitting:
+            listed = ", ".join(fitting) or "none yet"
+            raise AnyviewError(f"{name}: {key}: {_brief(found)} is none of these: {listed}")
     return params
 
 
@@ -370,19 +348,40 @@ def load_params(path: Path = Path("params.yaml")) -> Params:
     return parse_params(read_yaml(path), str(path))
 
 
-def _sources(cell: ImitationCell, translation: Translation) -> list[str]:
-    """What the reward of ``cell`` can be made from."""
-    if cell.reward in _LEARNED:
-        return [f"src/anyview/adversarial/{cell.reward}.py"]
-    method = "time-contrastive" if cell.reward == "embedding" else "translator"
-    return [f"data/models/{key}" for key, model in translation.cells.items() if model.method == method]
+def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
+    """Names in ``params`` that must be those of other keys: (dotted key, name, the names that fit)."""
+    sets = [*params.simulate.sets, REAL]
+    yield from ((f"split.{name}", name, sets) for name in params.split)
+    for block, models in (("translators", params.translators), ("embeddings", params.embeddings)):
+        yield from ((f"{block}.{key}.dataset", cell.dataset, sets) for key, cell in models.items())
+    yield "imitation.dataset", params.imitation.dataset, list(params.simulate.sets)
+    for key, cell in params.imitation.cells.items():
+        fitting = params.embeddings if cell.reward == "embedding" else params.translators
+        yield f"imitation.cells.{key}.model", cell.model, fitting
+
+
+def _refuse_twins(params: Params, name: str) -> None:
+    """Refuse two cells that would write to one folder, and a set of clips that is never split."""
+    for block, key, other, taken in (
+        ("embeddings", params.embeddings, "translators", params.translators),
+        ("adversarial.cells", params.adversarial.cells, "imitation.cells", params.imitation.cells),
+        ("simulate.sets", params.simulate.sets, "the clips that stage ingest makes", [REAL]),
+    ):
+        for cell in key:
+            if cell in taken:
+                raise AnyviewError(f"{name}: {block}.{cell}: the name is taken by {other}")
+    for dataset in (*params.simulate.sets, REAL):
+        if dataset not in params.split:
+            raise AnyviewError(f"{name}: split.{dataset}: missing key")
 
 
 def _explain(error: ValidationError) -> str:
     # Unknown keys first: one that is missing beside them is most often the same one, misspelt.
     first, *others = sorted(error.errors(), key=lambda found: found["type"] != "extra_forbidden")
-    tags = {"translator", "time-contrastive"}
-    key = ".".join(str(part) for part in first["loc"] if part not in tags) or "the file"
+    loc = first["loc"]
+    if loc[:2] == ("imitation", "cells"):
+        loc = loc[:3] + loc[4:]  # without the tag of the reward's kind
+    key = ".".join(str(part) for part in loc if part != "[key]") or "the file"
     if first["type"] == "extra_forbidden":
         message = "unknown key"
     elif first["type"] == "missing":
@@ -390,8 +389,8 @@ def _explain(error: ValidationError) -> str:
     else:
         message = first["msg"].removeprefix("Value error, ")
         if first["type"].startswith("union_tag"):
-            key += ".method"
-            message = f"Input should be {' or '.join(repr(tag) for tag in sorted(tags))}"
+            key += ".reward"
+            message = "Input should be 'translated', 'true' or 'embedding'"
         if not isinstance(first["input"], dict | list | set):  # aliases can make these endless
             message += f", got {_brief(first['input'])}"
     return f"{key}: {message}" + (f" (and {len(others)} more)" if others else "")

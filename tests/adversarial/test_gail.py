@@ -5,7 +5,7 @@ import pytest
 import torch
 from safetensors.numpy import load, save
 
-from anyview.adversarial.discriminators import LearnedReward
+from anyview.adversarial.common.discriminators import LearnedReward
 from anyview.adversarial.gail import FrameDiscriminator, gail_reward
 from tests.learners.toy import LAST, PARAMS, SIZE, clip_set, expert_motion, random_motion, show, squares
 

@@ -7,7 +7,7 @@ from torch.nn import functional as F
 from anyview.adversarial import tpil
 from anyview.adversarial.tpil import PairDiscriminator, ReverseGradient, tpil_reward
 from anyview.pusher.batch import PusherBatch
-from anyview.translator.network import to_input
+from anyview.video.pixels import to_input
 from tests.learners.toy import LAST, PARAMS, SIZE, clip_set, expert_motion, random_motion, show, squares
 
 
@@ -67,7 +67,7 @@ def test_a_step_is_judged_with_the_frame_three_steps_before():
     reward = make()
     clip = squares(random_motion(1, 9))[None]
     earned = show(reward, clip)[0, 0]
-    (network,) = reward._networks
+    (network,) = reward.networks
     for t in range(1, LAST + 1):
         pair = [to_input(clip[0, :, max(t - 3, 1)]), to_input(clip[0, :, t])]
         features = torch.cat([network.features(frame) for frame in pair], dim=1)

@@ -9,13 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.lib.stride_tricks import sliding_window_view
 
-from anyview.assessment.evaluation import evaluate, judge, translate_clip
+from anyview.assessment.evaluation import evaluate, evaluate_clip, translate_clip
 from anyview.assessment.importance import feature_weights
 from anyview.assessment.similarity import psnr, ssim
-from anyview.config import Evaluation
-from anyview.training.sampling import Dataset
-from anyview.translator.network import ContextTranslator, to_frames, to_input
+from anyview.config import Assessment
+from anyview.translator.network import ContextTranslator
+from anyview.video.datasets import Dataset
 from anyview.video.files import read_video
+from anyview.video.pixels import to_frames, to_input
 from tests.training.discworld import clip_table, disc_clips
 
 
@@ -75,7 +76,7 @@ def test_a_translated_clip_is_translated_frame_by_frame(model, views):
 
 
 def test_losses_of_a_clip_are_means_over_its_frames(model, views):
-    judged = judge(model, views, 2, 3)
+    evaluated = evaluate_clip(model, views, 2, 3)
     source, target = to_input(views.frames[2]), to_input(views.frames[3])
     z2, skips = model.encode_context(target[:1])
     squares, features = [], []
@@ -84,19 +85,19 @@ def test_losses_of_a_clip_are_means_over_its_frames(model, views):
         z3 = model.translate(model.encode_expert(source[t : t + 1]), z2)
         squares.append(float((model.decode(z3, skips) - target[t]).square().sum()))
         features.append(float((z3 - z_true).square().mean()))
-    row = judged.row
+    row = evaluated.row
     assert row["translation"] == pytest.approx(50 * np.mean(squares), rel=1e-4)
     assert row["last_frame"] == pytest.approx(50 * squares[-1], rel=1e-4)
     assert row["alignment"] == pytest.approx(1000 * np.mean(features), rel=1e-3)
     assert row["loss"] == pytest.approx(row["translation"] + row["reconstruction"] + row["alignment"])
-    true, translated = np.split(judged.frames, 2, axis=2)
+    true, translated = np.split(evaluated.frames, 2, axis=2)
     assert np.array_equal(true, views.frames[3])
     assert row["psnr"] == pytest.approx(psnr(translated, true))
     assert row["ssim"] == pytest.approx(slow_ssim(translated, true))
 
 
 def test_evaluation_writes_what_the_report_reads(model, views, tmp_path, monkeypatch):
-    params = Evaluation(clips=3, shown=2, permutations=4)
+    params = Assessment(clips=3, shown=2, permutations=4)
     outputs = {}
     for workers in ("1", "2"):
         monkeypatch.setenv("ANYVIEW_WORKERS", workers)
@@ -119,7 +120,7 @@ def test_evaluation_writes_what_the_report_reads(model, views, tmp_path, monkeyp
     assert np.array_equal(strip[16:, 32:], video[11, :, 16:])
 
 
-def test_feature_weights_are_shares_of_the_rise(model, views):
+def test_feature_weights_are_fractions_of_the_rise(model, views):
     table = feature_weights(model, views, [(2, 3), (4, 5)], 5, np.random.default_rng(0))
     assert table["weight"].sum() == pytest.approx(1)
     assert (table["weight"] >= 0).all()

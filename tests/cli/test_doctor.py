@@ -3,8 +3,8 @@ from pathlib import Path
 
 import pytest
 
+from anyview.cli import doctor
 from anyview.cli.doctor import disk_needed, examine
-from anyview.cli.main import doctor
 from anyview.cli.profiles import apply_profile
 from anyview.config import load_params
 
@@ -34,6 +34,15 @@ def test_what_is_missing_comes_with_advice(here, quick):
         "dvc": "run from the root of a clone of Anyview",
         "git": "clone Anyview with git: DVC compares revisions",
     }
+
+
+def test_a_path_in_which_dvcs_queue_fails_is_found(here, quick, monkeypatch):
+    (here / ".dvc").mkdir()
+    (here / ".dvc/config").touch()
+    assert "dvc" not in advice()
+    clone = here.rename(here.with_name("überblick"))
+    monkeypatch.chdir(clone)
+    assert "queue" in advice()["dvc"]
 
 
 def test_room_is_measured_against_the_params(here, quick, monkeypatch):

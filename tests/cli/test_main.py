@@ -7,8 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from anyview.cli.main import main as cli
-
 COMMANDS = ["doctor", "profile", "record", "clips", "translate", "watch", "review", "sweep", "clean"]
 
 
@@ -53,7 +51,7 @@ def test_each_command_has_help(here, command):
     ],
 )
 def test_the_shell_completes(here, typed, offered):
-    """As bash asks: commands, the options of commands whose modules are imported late, names of profiles."""
+    """As bash asks: commands, their options, names of profiles."""
     last = str(len(typed.split()) - 1)
     asked = {"_ANYVIEW_COMPLETE": "complete_bash", "COMP_WORDS": typed, "COMP_CWORD": last}
     script = Path(sys.executable).parent / "anyview"
@@ -141,7 +139,13 @@ def test_the_console_script_is_the_same_program(here):
     assert subprocess.run([script, "profile", "--check"], cwd=here, capture_output=True).returncode in (0, 1)
 
 
-@pytest.mark.parametrize("name", cli._ELSEWHERE)
-def test_the_line_for_a_command_elsewhere_is_its_own(name):
-    """The table in cli.py stands in for modules that are imported late."""
-    assert cli._load(name).help.splitlines()[0] == cli._ELSEWHERE[name][1]
+def test_a_missing_dependency_is_told_in_one_line(here):
+    """As where only some of the requirements are installed."""
+    script = "import sys; sys.modules['cv2'] = None; from anyview.cli.main import main; main()"
+    command = [sys.executable, "-c", script, "translate", "a.avi", "--context", "b.png", "--model", "sim"]
+    done = subprocess.run(command, cwd=here, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: ")
+    assert done.stderr.endswith("; run `make setup`\n")
+    assert done.stderr.count("\n") == 1
+    assert "cv2" in done.stderr

@@ -1,4 +1,4 @@
-"""The stages and `anyview translate`, as a user runs them."""
+"""`anyview translate`, as a user runs it."""
 
 import json
 import struct
@@ -9,10 +9,8 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import pandas as pd
 import pytest
 import torch
-from ruamel.yaml import YAML
 
 from anyview.assessment.evaluation import translate_clip
 from anyview.cli.footage import read_view
@@ -24,52 +22,10 @@ from anyview.video.files import read_video, write_video
 from tests.training.discworld import disc_clips
 
 
-def run(*command: str | Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, *map(str, command)], capture_output=True, text=True)
-
-
-@pytest.fixture
-def study(pipeline, root) -> Path:
-    """The pipeline's folder with small params."""
-    yaml = YAML()
-    params = yaml.load(root / "params.yaml")
-    params["translation"]["training"] |= {"batch_size": 10, "validation_every": 5, "validation_pairs": 20}
-    params["translation"]["evaluation"] |= {"clips": 5, "shown": 2, "permutations": 3}
-    params["translation"]["cells"]["sim"]["iterations"] = 10
-    yaml.dump(params, pipeline / "params.yaml")
-    return pipeline
-
-
-def test_train_then_translate(study, root):
-    trained = run(root / "stages/train.py", "sim", "sim-diverse")
-    assert trained.returncode == 0, trained.stderr
-    assert "10/10" in trained.stdout
-    assert "samples/s" in trained.stdout
-    translated = run(root / "stages/translate.py", "sim", "sim-diverse")
-    assert translated.returncode == 0, translated.stderr
-    assert len(pd.read_csv("data/translations/sim/clips.csv")) == 5
-    assert len(list(Path("data/translations/sim/clips").glob("*.avi"))) == 2
-
-
-@pytest.mark.parametrize(
-    ("command", "complaint"),
-    [
-        (["train", "sam"], "usage"),
-        (["train", "sim", "real"], "dvc.yaml"),
-        (["translate", "sim"], "data/models/sim"),
-    ],
-)
-def test_stages_refuse_what_cannot_be(study, root, command, complaint):
-    ended = run(root / f"stages/{command[0]}.py", *command[1:])
-    assert_refused(ended, complaint)
-
-
-def assert_refused(ended: subprocess.CompletedProcess[str], complaint: str) -> None:
-    """One line on standard error, no traceback, exit code 2."""
-    assert ended.returncode == 2, ended.stderr
-    assert ended.stderr.startswith("error: ")
-    assert ended.stderr.count("\n") == 1
-    assert complaint in ended.stderr
+def anyview_translate(clip: str, *options: str) -> subprocess.CompletedProcess[str]:
+    """Translate ``clip`` into the view `view.png` by the model `mine`."""
+    command = [sys.executable, "-m", "anyview", "translate", clip, "--context", "view.png", "--model", "mine"]
+    return subprocess.run([*command, *options], capture_output=True, text=True)
 
 
 @pytest.fixture
@@ -87,36 +43,21 @@ def footage(tmp_path, monkeypatch) -> None:
 
 
 def test_translating_a_clip_of_ones_own(footage):
-    ended = run(
-        "-m", "anyview", "translate", "clip.avi", "--context", "view.png", "--model", "mine", "-o", "out.avi"
-    )
+    ended = anyview_translate("clip.avi", "-o", "out.avi")
     assert ended.returncode == 0, ended.stderr
     assert "9 frames" in ended.stdout
     model = load_translator(Path("data/models/mine"))
     clip, view = disc_clips(2, length=9)
     assert np.array_equal(read_video(Path("out.avi")), translate_clip(model, clip, view[0]))
     assert cv2.VideoCapture("out.avi").get(cv2.CAP_PROP_FPS) == pytest.approx(15)
-    again = run(
-        "-m", "anyview", "translate", "clip.avi", "--context", "view.png", "--model", "mine", "--json"
-    )
+    again = anyview_translate("clip.avi", "--json")
     assert json.loads(again.stdout) == {"output": "translated.avi", "frames": 9, "size": 16, "rate": 15.0}
     assert Path("translated.avi").read_bytes() == Path("out.avi").read_bytes()
 
 
 def test_bad_footage_is_refused_in_one_line(footage):
-    command = (
-        "-m",
-        "anyview",
-        "translate",
-        "absent.avi",
-        "--context",
-        "view.png",
-        "--model",
-        "mine",
-        "-o",
-        "out.avi",
-    )
-    assert_refused(run(*command), "absent.avi: no such file")
+    ended = anyview_translate("absent.avi", "-o", "out.avi")
+    assert (ended.returncode, ended.stderr) == (2, "error: absent.avi: no such file\n")
 
 
 def test_a_view_that_claims_a_giant_picture_is_refused(tmp_path):
@@ -141,14 +82,6 @@ def test_a_damaged_view_is_refused(tmp_path, suffix):
             read_view(path, 48)
     path.write_bytes(whole)
     assert read_view(path, 48).shape == (48, 48, 3)
-
-
-def test_a_cell_and_the_data_set_that_dvc_yaml_gives_it(study, root):
-    for stage in ("train", "translate"):
-        ended = run(root / f"stages/{stage}.py", "sim", "sim-narrow")
-        assert_refused(
-            ended, "translation.cells.sim.dataset is sim-diverse, but dvc.yaml makes the cell depend on"
-        )
 
 
 def test_wide_clips_are_cut_to_their_middle_and_a_clip_may_be_the_context(footage):

@@ -5,19 +5,19 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from stable_baselines3 import DDPG
 
-from anyview import config
+from anyview.config import RewardWeights
 from anyview.environments.pusher import PusherEnv
 from anyview.environments.translated import TranslatedReward
 from anyview.pusher.batch import PusherBatch
 from anyview.rewards.demonstration import DemonstrationReward, translate_demonstrations
 
-PARAMS = config.Reward(phi=0.3, time_power=0.0, demonstrations=2)
+WEIGHTS = RewardWeights(feature=1.0, image=0.3)
 
 
 @pytest.fixture
 def env(translator, contexts, expert_clips) -> TranslatedReward:
     pusher = PusherEnv(contexts[4], image_size=32, render_mode="rgb_array")
-    return TranslatedReward(pusher, translator, expert_clips[:2], PARAMS)
+    return TranslatedReward(pusher, translator, expert_clips[:2], WEIGHTS)
 
 
 @pytest.mark.filterwarnings("ignore:.*not within the observation space.*")
@@ -30,7 +30,11 @@ def test_rewards_what_the_lockstep_evaluation_would(env, translator, contexts, e
     batch.reset()
     first = batch.render()
     reward = DemonstrationReward(
-        translator, *translate_demonstrations(translator, expert_clips[:2], first), first, PARAMS
+        translator,
+        *translate_demonstrations(translator, expert_clips[:2], first),
+        first,
+        WEIGHTS,
+        time_power=0.0,
     )
     env.reset(seed=0)
     rng = np.random.default_rng(0)

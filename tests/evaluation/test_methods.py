@@ -8,18 +8,27 @@ import pandas as pd
 import pytest
 import torch
 
-from anyview.config import Params, Reward, parse_params, read_yaml
-from anyview.embedding.embedding import Embedding, load_embedding, save_embedding
+from anyview.adversarial import gail, tpil
+from anyview.config import Params, parse_params, read_yaml
+from anyview.embedding.network import Embedding
+from anyview.embedding.weights import load_embedding, save_embedding
 from anyview.evaluation.demonstrations import imitated_demonstrations, training_clips
+from anyview.evaluation.methods import Method
 from anyview.evaluation.runs import evaluate_group
+from anyview.learners import ddpg, trpo
 from anyview.pusher.batch import PusherBatch
 from anyview.pusher.contexts import Context, sample_contexts
+from anyview.rewards.cells import make_reward
 from anyview.rewards.embedding import EmbeddingReward
 from anyview.seeds import stream
-from anyview.translator.network import to_input
+from anyview.video.pixels import to_input
 from anyview.video.sets import write_set, write_shard
 
-PARAMS = Reward(phi=0.3, time_power=2.0, demonstrations=2)
+METHODS = {
+    "gail": Method(trpo.make_learner, gail.make_reward),
+    "tpil": Method(trpo.make_learner, tpil.make_reward),
+    "tcn": Method(ddpg.make_learner, make_reward),
+}
 
 
 @pytest.fixture(scope="module")
@@ -33,22 +42,22 @@ def returns(reward: EmbeddingReward, clips: np.ndarray) -> np.ndarray:
 
 
 def test_reward_is_the_squared_distance_to_the_mean_embedding(model, expert_clips):
-    reward = EmbeddingReward(model, expert_clips[:2], expert_clips[2:4, 0], PARAMS)
+    reward = EmbeddingReward(model, expert_clips[:2], expert_clips[2:4, 0], time_power=2.0)
     seen = np.stack([expert_clips[2:4, 7], expert_clips[3:5, 9]], axis=1)  # 2 runs, 2 copies
     target = model(to_input(expert_clips[:2, 7])).mean(0)
     away = ((model(to_input(seen)[0]) - target) ** 2).sum(-1)
-    expected = -((7 / 49) ** 2) * away.numpy() / reward.units[0]
+    expected = -((7 / 49) ** 2) * away.numpy() / reward.scales[0]
     np.testing.assert_allclose(reward.step(seen, 7)[0], expected, rtol=1e-4)
 
 
 def test_standing_still_earns_minus_one_a_step_in_every_run(model, expert_clips):
-    reward = EmbeddingReward(model, expert_clips[:2], expert_clips[2:, 0], PARAMS)
+    reward = EmbeddingReward(model, expert_clips[:2], expert_clips[2:, 0], time_power=2.0)
     still = np.repeat(expert_clips[2:, :1], 50, axis=1)
     np.testing.assert_allclose(returns(reward, still), -49, rtol=1e-4)
 
 
 def test_the_demonstration_itself_earns_nothing_less_than_the_best(model, expert_clips):
-    reward = EmbeddingReward(model, expert_clips[:1], expert_clips[:1, 0], PARAMS)
+    reward = EmbeddingReward(model, expert_clips[:1], expert_clips[:1, 0], time_power=2.0)
     np.testing.assert_allclose(returns(reward, expert_clips[:1]), 0, atol=1e-4)
 
 
@@ -57,50 +66,50 @@ def study(tmp_path_factory, root, model, contexts, expert_clips) -> Iterator[Par
     """Params for 2 runs of 4 iterations, in a folder with the clips of the expert and the embedding."""
     folder = tmp_path_factory.mktemp("methods")
     names = [f"c{index}" for index in range(len(expert_clips))]
-    (folder / "data/sim/diverse").mkdir(parents=True)
+    (folder / "data/clips/diverse").mkdir(parents=True)
     (folder / "data/splits").mkdir()
-    shard = write_shard(folder / "data/sim/diverse", 0, expert_clips)
+    shard = write_shard(folder / "data/clips/diverse", 0, expert_clips)
     manifest = pd.DataFrame({"clip": names, "context": [context.to_json() for context in contexts]})
-    write_set(folder / "data/sim/diverse", manifest, [shard])
+    write_set(folder / "data/clips/diverse", manifest, [shard])
     split = pd.DataFrame({"clip": names, "pair": names, "split": ["validation", *["train"] * 4]})
-    split.to_csv(folder / "data/splits/sim-diverse.csv", index=False)
+    split.to_csv(folder / "data/splits/diverse.csv", index=False)
     save_embedding(folder / "data/models/tcn", model, {})
     values = read_yaml(root / "params.yaml")
     values["sim"]["image_size"] = 32
     values["imitation"] |= {"runs": 2, "iterations": 4}
-    values["imitation"]["reward"]["demonstrations"] = 1
+    values["imitation"]["demonstrations"] = 1
     values["imitation"]["trpo"] |= {"batch_episodes": 2}
     values["imitation"]["ddpg"] |= {"warmup_episodes": 1, "updates_per_step": 0.2, "batch_size": 8}
-    values["imitation"]["discriminator"] |= {"batch_size": 4, "steps": 2}
+    values["adversarial"]["discriminator"] |= {"batch_size": 4, "steps": 2}
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         yield parse_params(values)
 
 
-@pytest.mark.parametrize("cell", ["gail", "tpil", "tcn"])
+@pytest.mark.parametrize("cell", METHODS)
 def test_the_evaluation_runs_each_baseline(study: Params, tmp_path: Path, cell: str):
     contexts, _ = sample_contexts(stream(1, "test"), 2)
     clips, demonstrations = imitated_demonstrations(study)
     assert clips == ["c0"]
-    result = evaluate_group(cell, study, range(2), contexts, demonstrations, tmp_path)
+    result = evaluate_group(cell, study, METHODS[cell], range(2), contexts, demonstrations, tmp_path)
     assert np.isfinite(result.curve.to_numpy()).all()
     assert len(result.curve) == 2 * 4
     assert result.rollouts.shape == (2, 50, 32, 64, 3)
     np.testing.assert_array_equal(result.rollouts[1, :, :, 32:], demonstrations[0])
     if cell == "tcn":
         np.testing.assert_allclose(
-            result.runs["return_still"], -49 * _units(study, contexts, demonstrations), rtol=1e-3
+            result.runs["return_still"], -49 * _scales(study, contexts, demonstrations), rtol=1e-3
         )
     else:
         assert result.curve["expert_accuracy"].between(0, 1).all()
         assert "return_still" not in result.runs
 
 
-def _units(study: Params, contexts: list[Context], demonstrations: np.ndarray) -> np.ndarray:
+def _scales(study: Params, contexts: list[Context], demonstrations: np.ndarray) -> np.ndarray:
     batch = PusherBatch(contexts, "twist", 32)
     batch.reset()
     model = load_embedding(Path("data/models/tcn"))
-    return EmbeddingReward(model, demonstrations, batch.render(), study.imitation.reward).units
+    return EmbeddingReward(model, demonstrations, batch.render(), time_power=0.0).scales
 
 
 def test_discriminators_learn_from_the_training_split_alone(study: Params):
@@ -109,5 +118,5 @@ def test_discriminators_learn_from_the_training_split_alone(study: Params):
     assert len(frames) == 5
     assert [context.azimuth for context in contexts] == [
         Context.from_json(text).azimuth
-        for text in pd.read_csv("data/sim/diverse/manifest.csv")["context"].iloc[1:]
+        for text in pd.read_csv("data/clips/diverse/manifest.csv")["context"].iloc[1:]
     ]

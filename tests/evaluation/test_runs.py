@@ -13,15 +13,20 @@ import pytest
 from ruamel.yaml import YAML
 
 from anyview.config import load_params
+from anyview.evaluation.methods import Method
 from anyview.evaluation.runs import evaluate_group, groups_of
+from anyview.learners import ddpg
 from anyview.learners.common.policies import load_policy
 from anyview.pusher.batch import PusherBatch
 from anyview.pusher.contexts import sample_contexts
+from anyview.rewards.cells import make_reward
 from anyview.runtime.errors import AnyviewError
 from anyview.seeds import stream
 from anyview.translator.weights import save_translator
 from anyview.video.files import read_video
 from anyview.video.sets import write_set, write_shard
+
+OURS = Method(ddpg.make_learner, make_reward)
 
 
 @pytest.fixture(scope="module")
@@ -33,17 +38,17 @@ def study(tmp_path_factory, root: Path, translator, expert_clips) -> Path:
     params["sim"]["image_size"] = 32
     imitation = params["imitation"]
     imitation |= {"runs": 9, "iterations": 3, "episodes_per_iteration": 1}
-    imitation["reward"]["demonstrations"] = 2
+    imitation["demonstrations"] = 2
     imitation["ddpg"] |= {"warmup_episodes": 1, "updates_per_step": 0.2, "hidden": [16], "batch_size": 8}
     with (folder / "params.yaml").open("w") as handle:
         yaml.dump(params, handle)
     clips = [f"c{index}" for index in range(len(expert_clips))]
-    (folder / "data/sim/diverse").mkdir(parents=True)
+    (folder / "data/clips/diverse").mkdir(parents=True)
     (folder / "data/splits").mkdir()
-    shard = write_shard(folder / "data/sim/diverse", 0, expert_clips)
-    write_set(folder / "data/sim/diverse", pd.DataFrame({"clip": clips}), [shard])
+    shard = write_shard(folder / "data/clips/diverse", 0, expert_clips)
+    write_set(folder / "data/clips/diverse", pd.DataFrame({"clip": clips}), [shard])
     split = pd.DataFrame({"clip": clips, "pair": clips, "split": ["train", *["validation"] * 4]})
-    split.to_csv(folder / "data/splits/sim-diverse.csv", index=False)
+    split.to_csv(folder / "data/splits/diverse.csv", index=False)
     save_translator(folder / "data/models/sim", translator, {})
     return folder
 
@@ -139,7 +144,7 @@ def test_an_interrupted_group_ends_with_the_same_results(
     monkeypatch.chdir(study)
     params = load_params()
     contexts, _ = sample_contexts(stream(0, "test"), 2)
-    work = ("ours", params, [0, 1], contexts, expert_clips[:2])
+    work = ("ours", params, OURS, [0, 1], contexts, expert_clips[:2])
     whole = evaluate_group(*work, tmp_path / "whole")
 
     class Stop(Exception):
@@ -172,8 +177,10 @@ def test_a_run_in_lockstep_is_the_same_run_alone(study: Path, tmp_path: Path, ex
     monkeypatch.chdir(study)
     params = load_params()
     contexts, _ = sample_contexts(stream(0, "test"), 3)
-    together = evaluate_group("ours", params, [0, 1, 2], contexts, expert_clips[:2], tmp_path / "together")
-    alone = evaluate_group("ours", params, [1], contexts[1:2], expert_clips[:2], tmp_path / "alone")
+    together = evaluate_group(
+        "ours", params, OURS, [0, 1, 2], contexts, expert_clips[:2], tmp_path / "together"
+    )
+    alone = evaluate_group("ours", params, OURS, [1], contexts[1:2], expert_clips[:2], tmp_path / "alone")
     same = together.runs[together.runs["run"] == 1].reset_index(drop=True)
     pd.testing.assert_frame_equal(alone.runs, same, rtol=1e-4)
     for name, weights in alone.policies.items():
@@ -184,8 +191,8 @@ def test_a_run_in_lockstep_is_the_same_run_alone(study: Path, tmp_path: Path, ex
 @pytest.mark.parametrize(
     ("change", "complaint"),
     [
-        (("imitation", "reward", "demonstrations", 7), "imitation.reward.demonstrations: 7"),
-        (("sim", "image_size", None, 64), "data/sim/diverse: frames of 32 pixels"),
+        (("imitation", "demonstrations", None, 7), "imitation.demonstrations: 7"),
+        (("sim", "image_size", None, 64), "data/clips/diverse: frames of 32 pixels"),
     ],
 )
 def test_bad_input_is_one_clear_line(study, root, tmp_path, change, complaint: str) -> None:

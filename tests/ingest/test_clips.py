@@ -1,4 +1,4 @@
-"""Ingest: a folder of raw clips becomes a set; every clip is judged, none stops the others."""
+"""Ingest: a folder of raw clips becomes a set; each gets its verdict, none stops the others."""
 
 import os
 import shutil
@@ -130,7 +130,7 @@ def test_published_clips_open_as_a_set(tmp_path):
 
 
 def test_the_stage_takes_a_mixed_folder_and_one_bad_clip_stops_nothing(tmp_path, root):
-    raw = tmp_path / "data" / "real" / "raw"
+    raw = tmp_path / "data" / "raw" / "recorded"
     rows = []
     kinds = ((".mp4", "mp4v", 30.0), (".mov", "mp4v", 25.0), (".mkv", "XVID", 12.0), (".avi", "MJPG", 10.0))
     for index, (suffix, codec, fps) in enumerate(kinds):
@@ -145,7 +145,7 @@ def test_the_stage_takes_a_mixed_folder_and_one_bad_clip_stops_nothing(tmp_path,
     (tmp_path / "params.yaml").write_text(params)
     outputs = []
     for workers in ("1", "2"):
-        shutil.rmtree(tmp_path / "data" / "real" / "clips", ignore_errors=True)
+        shutil.rmtree(tmp_path / "data" / "clips" / "real", ignore_errors=True)
         for stage in (["ingest.py"], ["split.py", "real"]):
             done = subprocess.run(
                 [sys.executable, str(root / "stages" / stage[0]), *stage[1:]],
@@ -157,10 +157,10 @@ def test_the_stage_takes_a_mixed_folder_and_one_bad_clip_stops_nothing(tmp_path,
             )
             assert done.returncode == 0, done.stderr
             assert done.stderr == ""
-        files = sorted((tmp_path / "data" / "real" / "clips").iterdir())
+        files = sorted((tmp_path / "data" / "clips" / "real").iterdir())
         outputs.append({path.name: path.read_bytes() for path in files})
     assert outputs[0] == outputs[1]
-    assert pd.read_csv(tmp_path / "data/real/clips/refused.csv")["file"].tolist() == ["bad.avi"]
+    assert pd.read_csv(tmp_path / "data/clips/real/refused.csv")["file"].tolist() == ["bad.avi"]
     split = pd.read_csv(tmp_path / "data/splits/real.csv")
     assert split["split"].value_counts().to_dict() == {"train": 2, "validation": 2}
     assert (split.groupby("pair")["split"].nunique() == 1).all()

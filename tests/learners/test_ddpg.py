@@ -5,8 +5,17 @@ import pytest
 import torch
 
 from anyview import config
-from anyview.learners.common.policies import Policy, with_time_bumps
-from anyview.learners.ddpg import DDPG
+from anyview.learners.common.policies import Policy
+from anyview.learners.common.stacked import StackedMLP
+from anyview.learners.ddpg import (
+    DDPG,
+    Transitions,
+    critic_loss,
+    critic_targets,
+    minibatch_ages,
+    n_step_transitions,
+    policy_loss,
+)
 from anyview.pusher.contexts import Context
 from tests.learners.tracking import ACTION, HORIZON, OBSERVATION, Tracking, mean_distance, practise
 
@@ -70,80 +79,122 @@ def test_resumes_bit_for_bit() -> None:
 @pytest.mark.parametrize("n", [1, 3, 49])
 def test_transitions_hold_n_step_returns(n: int) -> None:
     """Against the definition, step by step, with no bootstrapping past the end."""
-    learner = make([0, 1], copies=2, n_step=n, warmup_episodes=10**6)
-    world, rewards, seen = Tracking([0, 1], 2), [], []
-    observations = world.reset()
-    for step in range(1, HORIZON + 1):
-        actions = learner.act(observations, explore=True)
-        following, reward = world.step(actions)
-        learner.record(observations, actions, reward, following, step)
-        rewards.append(reward)
-        seen.append(observations)
-        observations = following
-    seen.append(observations)
-    rows = learner._transitions().unflatten(1, (2, HORIZON)).numpy()
+    generator = torch.Generator().manual_seed(n)
+    seen = torch.randn(HORIZON + 1, 2, 3, OBSERVATION, generator=generator)
+    actions = torch.randn(HORIZON, 2, 3, ACTION, generator=generator)
+    rewards = torch.randn(HORIZON, 2, 3, generator=generator)
+    found = n_step_transitions(seen[:-1], actions, rewards, seen[1:], 0.5, n)
+    assert torch.equal(found.observations, seen[:-1])
+    assert torch.equal(found.actions, actions)
     for t in (0, 20, 45, 48):
         expected = sum(0.5**k * rewards[t + k] for k in range(min(n, HORIZON - t)))
-        np.testing.assert_allclose(rows[:, :, t, 7], expected, rtol=1e-5)
-        np.testing.assert_array_equal(rows[:, :, t, :5], seen[t])
+        torch.testing.assert_close(found.returns[t, ..., 0], expected)
         if t + n < HORIZON:
-            np.testing.assert_array_equal(rows[:, :, t, 8:13], seen[t + n])
-            np.testing.assert_allclose(rows[:, :, t, 13], 0.5**n, rtol=1e-6)
+            assert torch.equal(found.next_observations[t], seen[t + n])
+            torch.testing.assert_close(found.bootstrap_discounts[t], torch.full((2, 3, 1), 0.5**n))
         else:
-            assert (rows[:, :, t, 13] == 0).all()
+            assert (found.bootstrap_discounts[t] == 0).all()
 
 
-def test_an_update_is_the_textbooks() -> None:
-    """One update of one row against torch's own layers, autograd and Adam."""
-    learner = make([0], warmup_episodes=10**6)
-    practise(learner, Tracking([0]), 2)
-    policy, critic = _layers(learner._policy), _layers(learner._critic)
-    target_policy, target_critic = _layers(learner._target_policy), _layers(learner._target_critic)
-    batch = learner._replay.take(torch.arange(40)[None])
-    observations, actions, returns, following, beyond = batch[0].split([5, 2, 1, 5, 1], dim=-1)
-    inputs, next_inputs = with_time_bumps(observations, 13), with_time_bumps(following, 13)
-    with torch.no_grad():
-        next_values = target_critic(torch.cat([next_inputs, torch.tanh(target_policy(next_inputs))], -1))
-    optimiser = torch.optim.Adam(critic.parameters(), lr=0.002)
-    loss = torch.nn.functional.mse_loss(
-        critic(torch.cat([inputs, actions], -1)), returns + beyond * next_values
+def test_half_of_each_batch_comes_from_the_newest_transitions() -> None:
+    ages = minibatch_ages(np.random.default_rng(0), updates=500, batch_size=9, newest=10, size=1000)
+    assert ages.shape == (500, 9)
+    assert set(ages[:, :4].flat) == set(range(10))
+    assert 450 < ages[:, 4:].mean() < 550
+    assert ages.max() < 1000
+
+
+def networks(*sizes: int, seed: int) -> tuple[StackedMLP, list[torch.nn.Sequential]]:
+    """Two random networks stacked, and each of them of torch's own layers."""
+    stacked = StackedMLP.initial(sizes, np.random.default_rng(seed).spawn(2), torch.device("cpu"))
+    stacked.flat.add_(
+        torch.randn(stacked.flat.shape, generator=torch.Generator().manual_seed(seed)), alpha=0.1
     )
-    loss.backward()
-    optimiser.step()
-    ascent = torch.optim.Adam(policy.parameters(), lr=0.001)
-    before_tanh = policy(inputs)
-    value = critic(torch.cat([inputs, torch.tanh(before_tanh)], -1)).mean()
-    (0.1 * before_tanh.square().sum(-1).mean() - value).backward()
-    ascent.step()
-    before = learner._target_critic.flat.clone()
-    learner._update(batch)
-    for network, expected in ((learner._policy, policy), (learner._critic, critic)):
-        ours = torch.cat([part[0].flatten() for layer in network.layers for part in layer]).detach()
-        theirs = torch.cat([part.detach().t().flatten() for part in expected.parameters()])
-        torch.testing.assert_close(ours, theirs, atol=1e-5, rtol=1e-3)
-    torch.testing.assert_close(
-        learner._target_critic.flat, 0.9 * before + 0.1 * learner._critic.flat, atol=1e-6, rtol=1e-5
-    )
+    alone = []
+    for row in range(2):
+        parts: list[torch.nn.Module] = []
+        for weight, bias in stacked.layers:
+            linear = torch.nn.Linear(weight.shape[1], weight.shape[2])
+            linear.weight.data, linear.bias.data = weight[row].T.clone(), bias[row, 0].clone()
+            parts += [linear, torch.nn.ReLU()]
+        alone.append(torch.nn.Sequential(*parts[:-1]))
+    return stacked, alone
 
 
-def _layers(network) -> torch.nn.Sequential:
-    parts: list[torch.nn.Module] = []
-    for weight, bias in network.layers:
-        linear = torch.nn.Linear(weight.shape[1], weight.shape[2])
-        linear.weight.data, linear.bias.data = weight[0].detach().T.clone(), bias[0, 0].detach().clone()
-        parts += [linear, torch.nn.ReLU()]
-    return torch.nn.Sequential(*parts[:-1])
+def gradients(network: StackedMLP, loss: torch.Tensor) -> list[torch.Tensor]:
+    """Of the weights and biases of both networks, row by row as torch's layers have them."""
+    found = torch.autograd.grad(loss, [part for layer in network.layers for part in layer])
+    return [each[row].T if each.shape[1] > 1 else each[row, 0] for row in range(2) for each in found]
+
+
+def test_targets_and_losses_are_the_textbooks() -> None:
+    """Of two stacked networks against torch's own layers and autograd, one by one."""
+    policy, policies = networks(OBSERVATION, 16, ACTION, seed=1)
+    critic, critics = networks(OBSERVATION + ACTION, 16, 1, seed=2)
+    generator = torch.Generator().manual_seed(3)
+    inputs, next_inputs = torch.randn(2, 2, 40, OBSERVATION, generator=generator)
+    actions = torch.rand(2, 40, ACTION, generator=generator) * 2 - 1
+    returns, discounts = torch.rand(2, 2, 40, 1, generator=generator)
+    batch = Transitions(inputs, actions, returns, next_inputs, discounts)
+    targets = critic_targets(policy, critic, batch, next_inputs)
+    for network in (policy, critic):
+        for layer in network.layers:
+            for part in layer:
+                part.requires_grad_()
+    of_critic = critic_loss(critic, inputs, actions, targets)
+    of_policy = policy_loss(policy, critic, inputs, 0.1)
+    assert targets.shape == (2, 40, 1)
+    assert of_critic.shape == of_policy.shape == (2, 1)
+    critic_gradients, policy_gradients = [], []
+    for row in range(2):
+        with torch.no_grad():
+            chosen = torch.tanh(policies[row](next_inputs[row]))
+            values = critics[row](torch.cat([next_inputs[row], chosen], -1))
+        torch.testing.assert_close(targets[row], returns[row] + discounts[row] * values)
+        estimates = critics[row](torch.cat([inputs[row], actions[row]], -1))
+        loss = torch.nn.functional.mse_loss(estimates, targets[row])
+        torch.testing.assert_close(of_critic[row, 0], loss)
+        critic_gradients += torch.autograd.grad(loss, list(critics[row].parameters()))
+        before_tanh = policies[row](inputs[row])
+        value = critics[row](torch.cat([inputs[row], torch.tanh(before_tanh)], -1)).mean()
+        loss = 0.1 * before_tanh.square().sum(-1).mean() - value
+        torch.testing.assert_close(of_policy[row, 0], loss)
+        policy_gradients += torch.autograd.grad(loss, list(policies[row].parameters()))
+    for network, loss, expected in (
+        (critic, of_critic, critic_gradients),
+        (policy, of_policy, policy_gradients),
+    ):
+        for found, wanted in zip(gradients(network, loss.sum()), expected, strict=True):
+            torch.testing.assert_close(found, wanted, atol=1e-5, rtol=1e-3)
+
+
+def test_target_networks_follow_by_the_target_rate() -> None:
+    """One update after one episode."""
+    learner = make([0, 1], warmup_episodes=1, updates_per_step=1 / HORIZON)
+    before = {name: array.copy() for name, array in learner.state().items()}
+    practise(learner, Tracking([0, 1]), 1)
+    after = learner.state()
+    for name in ("policy", "critic"):
+        assert (after[name] != before[name]).any()
+        expected = 0.9 * before[f"target_{name}"] + 0.1 * after[name]
+        np.testing.assert_allclose(after[f"target_{name}"], expected, atol=1e-6, rtol=1e-5)
 
 
 def test_exploration_shrinks_and_acting_without_it_is_repeatable() -> None:
-    learner, observations = make([0, 1], iterations=4), Tracking([0, 1]).reset()
-    greedy = learner.act(observations, explore=False)
-    np.testing.assert_array_equal(greedy, learner.act(observations, explore=False))
+    learner, world = make([0, 1], iterations=4, warmup_episodes=10**6), Tracking([0, 1])
+    greedy = learner.act(world.reset(), explore=False)
+    np.testing.assert_array_equal(greedy, learner.act(world.reset(), explore=False))
     spread = []
-    for iteration in range(4):
-        learner._iteration = iteration
-        learner._begin()
-        spread.append(learner._noise.std())
+    for _ in range(4):
+        observations, away = world.reset(), []
+        for step in range(1, HORIZON + 1):
+            actions = learner.act(observations, explore=True)
+            away.append(actions - learner.act(observations, explore=False))
+            next_observations, rewards = world.step(actions)
+            learner.record(observations, actions, rewards, next_observations, step)
+            observations = next_observations
+        learner.end_iteration()
+        spread.append(np.std(away))
     assert spread[0] > 1.2 * spread[1] > 1.2**2 * spread[2] > 1.2**3 * spread[3]
 
 

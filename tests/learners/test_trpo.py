@@ -102,8 +102,8 @@ def test_advantages_match_their_definition(seed: int, discount: float, gae_lambd
     rng = np.random.default_rng(seed)
     rewards, values = rng.standard_normal((2, 2, 3, HORIZON))
     result = advantage_estimates(torch.from_numpy(rewards), torch.from_numpy(values), discount, gae_lambda)
-    following = np.concatenate([values[..., 1:], np.zeros((2, 3, 1))], axis=-1)
-    delta = rewards + discount * following - values
+    next_values = np.concatenate([values[..., 1:], np.zeros((2, 3, 1))], axis=-1)
+    delta = rewards + discount * next_values - values
     for t in range(HORIZON):
         expected = sum((discount * gae_lambda) ** k * delta[..., t + k] for k in range(HORIZON - t))
         np.testing.assert_allclose(result[..., t].numpy(), expected, atol=1e-10)
@@ -186,9 +186,9 @@ def learn(learner: TRPO, world: Tracking, iterations: int) -> np.ndarray:
             actions = learner.act(observations, explore=True)
             assert np.abs(actions).max() <= 1
             rewards = world.reward(observations, actions)
-            following = world.observe(step)
-            learner.record(observations, actions, rewards, following, step)
-            observations = following
+            next_observations = world.observe(step)
+            learner.record(observations, actions, rewards, next_observations, step)
+            observations = next_observations
             total = total + rewards.mean(-1) / HORIZON
         learner.end_iteration()
         history.append(total)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from anyview import config
-from anyview.adversarial.discriminators import ClipSet, LearnedReward
+from anyview.adversarial.common.discriminators import ClipSet, LearnedReward
 
 SIZE, LAST = 16, 8
 PARAMS = config.Discriminator(batch_size=16, learning_rate=0.003, steps=20, domain_weight=0.2)

@@ -47,9 +47,9 @@ def practise(learner: Learner, world: Tracking, iterations: int) -> None:
         observations = world.reset()
         for step in range(1, HORIZON + 1):
             actions = learner.act(observations, explore=True)
-            following, rewards = world.step(actions)
-            learner.record(observations, actions, rewards, following, step)
-            observations = following
+            next_observations, rewards = world.step(actions)
+            learner.record(observations, actions, rewards, next_observations, step)
+            observations = next_observations
         learner.end_iteration()
 
 

@@ -1,5 +1,7 @@
 """Batched physics against MuJoCo stepped one simulation at a time, and the expert in it."""
 
+import pickle
+
 import mujoco
 import numpy as np
 import pytest
@@ -55,6 +57,30 @@ def test_observations_stay_in_their_bounds_under_wild_actions() -> None:
         observations = batch.step(np.full((len(CONTEXTS), 3), 1.0))
         assert np.isfinite(observations).all()
         assert np.abs(observations).max() <= 3
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_an_action_that_is_not_finite_is_refused(value: float) -> None:
+    batch = PusherBatch(CONTEXTS)
+    before = batch.reset()
+    actions = np.zeros((len(CONTEXTS), 3))
+    actions[3, 1] = value
+    with pytest.raises(ValueError, match="action: expected finite numbers"):
+        batch.step(actions)
+    np.testing.assert_array_equal(batch.observations(), before)
+
+
+def test_a_pickled_batch_continues_exactly() -> None:
+    actions = np.random.default_rng(2).uniform(-1, 1, (30, len(CONTEXTS), 3))
+    batch = PusherBatch(CONTEXTS, image_size=32)
+    batch.reset()
+    for action in actions[:10]:
+        batch.step(action)
+    twin = pickle.loads(pickle.dumps(batch))
+    for action in actions[10:]:
+        np.testing.assert_array_equal(twin.step(action), batch.step(action))
+        np.testing.assert_array_equal(twin.positions(), batch.positions())
+    np.testing.assert_array_equal(twin.render(), batch.render())
 
 
 def test_expert_succeeds_in_unseen_contexts_on_one_time_profile() -> None:

@@ -1,11 +1,14 @@
 """Contexts obey their definition, whatever the seed."""
 
+from collections.abc import Iterator
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from anyview.pusher.contexts import Context, sample_contexts
+from anyview.pusher.contexts import Context, Distractor, sample_contexts
 from anyview.pusher.kinematics import tool_pose
 from anyview.pusher.path import clearance, expert_poses
 from anyview.pusher.scene import ARENA_CENTRE, ARENA_RADIUS, GOAL_COLOUR, JOINT_RANGE, OBJECT_COLOUR, SEAT
@@ -28,6 +31,41 @@ def test_contexts_obey_their_definition(seed: int, kind: str) -> None:
             for colour in (GOAL_COLOUR, OBJECT_COLOUR):
                 assert np.linalg.norm(np.array(distractor.colour) - colour) >= 0.5
         assert Context.from_json(context.to_json()) == context
+
+
+def numbers(value: object) -> Iterator[float]:
+    """Every floating-point number in nested tuples of dataclasses."""
+    if isinstance(value, Context | Distractor):
+        value = tuple(vars(value).values())
+    if isinstance(value, tuple):
+        for part in value:
+            yield from numbers(part)
+    elif isinstance(value, float):
+        yield value
+
+
+@pytest.mark.parametrize("kind", ["diverse", "narrow"])
+def test_a_last_bit_cannot_move_a_context(kind: str) -> None:
+    contexts, _ = sample_contexts(np.random.default_rng(9), 30, kind)
+    values = list(numbers(tuple(contexts)))
+    assert len(values) >= 30 * 8
+    assert all(value == round(value, 6) for value in values)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("arm_qpos", (0.0, float("nan"), 0.0)),
+        ("arm_qpos", (0.0, 0.0)),
+        ("object_xy", (1e12, 0.0)),
+        ("goal_xy", "left"),
+        ("azimuth", None),
+    ],
+)
+def test_a_context_in_which_physics_cannot_start_is_refused(name: str, value: object) -> None:
+    context = sample_contexts(np.random.default_rng(9), 1)[0][0]
+    with pytest.raises(ValueError, match=f"^context: {name}: expected "):
+        replace(context, **{name: value})
 
 
 def test_diverse_contexts_look_from_everywhere_past_distractors() -> None:

@@ -1,4 +1,4 @@
-"""The page in a real browser: no error on its console, every picture loads, films play."""
+"""The page in a real browser: no error on its console, every picture loads, clips play."""
 
 import json
 import os
@@ -18,16 +18,16 @@ addEventListener("error", (event) => errors.push(event.message || event.target.o
 VERDICT = """
 <script>
 addEventListener("load", async () => {
-  const box = document.querySelectorAll(".reels")[1];
-  const film = box.querySelector(".film img");
-  const shown = () => film.getBoundingClientRect().top - film.parentElement.getBoundingClientRect().top;
+  const box = document.querySelectorAll(".player")[1];
+  const clip = box.querySelector(".clip img");
+  const shown = () => clip.getBoundingClientRect().top - clip.parentElement.getBoundingClientRect().top;
   const slider = box.querySelector("input");
   slider.value = 0;
   slider.dispatchEvent(new Event("input"));
   const first = shown();
   slider.value = slider.max;
   slider.dispatchEvent(new Event("input"));
-  const travel = (first - shown()) / film.parentElement.getBoundingClientRect().height;
+  const travel = (first - shown()) / clip.parentElement.getBoundingClientRect().height;
   box.querySelector("button").click();
   const start = slider.value;
   await new Promise((resume) => setTimeout(resume, 3000));
@@ -40,7 +40,7 @@ addEventListener("load", async () => {
     broken: [...document.images].filter((image) => !(image.complete && image.naturalWidth)).length,
     travel,
     played: slider.value !== start,
-    reels: [...box.querySelectorAll(".reel")].map((reel) => reel.hidden),
+    hidden: [...box.querySelectorAll(".choice")].map((choice) => choice.hidden),
     overflow: document.documentElement.scrollWidth - innerWidth,
   };
   document.title = "verdict" + JSON.stringify(verdict);
@@ -83,5 +83,5 @@ def test_the_page_works(browser, full, report, tmp_path, width):
     assert verdict["pictures"] > 50
     assert verdict["played"]
     assert verdict["travel"] == pytest.approx(25, abs=1)
-    assert verdict["reels"] == [True, False, True, True, True, True]
+    assert verdict["hidden"] == [True, False, True, True, True, True]
     assert verdict["overflow"] <= 0

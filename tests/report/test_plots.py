@@ -9,7 +9,8 @@ import sys
 import pandas as pd
 import pytest
 
-from anyview.report.inputs import read_study
+from anyview.analysis.results import analyse
+from anyview.analysis.study import read_study
 from anyview.report.plots import write_plots
 
 
@@ -17,7 +18,8 @@ from anyview.report.plots import write_plots
 def shown(full, params, root, tmp_path_factory):
     """``dvc plots show --json`` of the repository's own declarations over a whole study."""
     project = tmp_path_factory.mktemp("plots")
-    write_plots(project / "metrics/plots", read_study(full / "data", params))
+    study = read_study(params, full)
+    write_plots(project / "metrics/plots", study, analyse(study))
     (project / "metrics/live").mkdir()
     shutil.copy(root / "metrics/live/none.csv", project / "metrics/live")
     shutil.copy(root / "dvc.yaml", project)
@@ -61,9 +63,9 @@ def test_plots_have_titles_axes_and_bounds(shown):
 
 
 def test_tables_are_thin_and_keep_their_last_point(full, params, tmp_path):
-    study = read_study(full / "data", params)
-    write_plots(tmp_path, study)
+    study = read_study(params, full)
+    write_plots(tmp_path, study, analyse(study))
     table = pd.read_csv(tmp_path / "final_distance.csv")
     assert table.groupby("cell").size().max() <= 101
-    last = study.evaluations["ours"].curve["iteration"].max()
+    last = study.methods["ours"].curve["iteration"].max()
     assert table[table["cell"] == "ours"]["iteration"].max() == last

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 import torch
 
-from anyview import config
+from anyview.config import RewardWeights
 from anyview.rewards.demonstration import DemonstrationReward, translate_demonstrations, true_demonstrations
-from anyview.translator.network import ContextTranslator, to_input
+from anyview.translator.network import ContextTranslator
+from anyview.video.pixels import to_input
 
 
 def literal(
@@ -31,9 +32,9 @@ def literal(
 )
 def test_reward_is_the_equations(translator, expert_clips, feature: bool, image: bool, power: float) -> None:
     demonstrations, first = expert_clips[:3], expert_clips[3:, 0]
-    params = config.Reward(phi=0.3, time_power=power, demonstrations=3)
+    weights = RewardWeights(feature=1.0 if feature else 0.0, image=0.3 if image else 0.0)
     targets = translate_demonstrations(translator, demonstrations, first)
-    reward = DemonstrationReward(translator, *targets, first, params, feature, image)
+    reward = DemonstrationReward(translator, *targets, first, weights, power)
     # Standing still, term by term: the units.
     still = np.zeros((2, 2))
     for run in range(2):
@@ -56,26 +57,26 @@ def test_reward_is_the_equations(translator, expert_clips, feature: bool, image:
                 ratio = phi * still[run, 0] / still[run, 1]
                 plain = l_f + ratio * l_i if feature else l_i
                 np.testing.assert_allclose(
-                    got[run, copy] * reward.units[run], (t / 49) ** power * plain, rtol=1e-4
+                    got[run, copy] * reward.scales[run], (t / 49) ** power * plain, rtol=1e-4
                 )
 
 
 def test_standing_still_earns_minus_one_a_step(translator, expert_clips) -> None:
     first = expert_clips[:, 0]
-    params = config.Reward(phi=0.7, time_power=1.0, demonstrations=3)
+    weights = RewardWeights(feature=1.0, image=0.7)
     for targets in (
         translate_demonstrations(translator, expert_clips[:3], first),
         true_demonstrations(translator, expert_clips),
     ):
-        reward = DemonstrationReward(translator, *targets, first, params)
+        reward = DemonstrationReward(translator, *targets, first, weights, time_power=1.0)
         returns = sum(reward.step(first[:, None], t) for t in range(1, 50))
         np.testing.assert_allclose(returns, -49, rtol=1e-4)
 
 
 def test_the_oracle_s_optimum_is_the_experts_own_motion(translator, expert_clips) -> None:
     targets = true_demonstrations(translator, expert_clips)
-    params = config.Reward(phi=0.3, time_power=0.0, demonstrations=3)
-    reward = DemonstrationReward(translator, *targets, expert_clips[:, 0], params)
+    weights = RewardWeights(feature=1.0, image=0.3)
+    reward = DemonstrationReward(translator, *targets, expert_clips[:, 0], weights, time_power=0.0)
     np.testing.assert_array_equal(reward.targets(), expert_clips)
     for t in (1, 25, 49):
         same = reward.step(expert_clips[:, None, t], t)

@@ -107,10 +107,10 @@ def test_a_stopped_stage_cleans_up(tmp_path, number):
 
 def test_ctrl_c_with_workers_at_work_is_one_line(tmp_path):
     """A terminal sends SIGINT to the whole group: the stage and its workers."""
-    body = f"""from anyview.runtime.workers import run_units
+    body = f"""from anyview.runtime.workers import run_tasks
 sys.path.insert(0, {str(Path(__file__).parent)!r})
-from units import hold
-for _ in run_units(hold, [(arguments[0], n) for n in range(4)]): pass"""
+from tasks import hold
+for _ in run_tasks(hold, [(arguments[0], n) for n in range(4)]): pass"""
     process = stage(body, str(tmp_path), start_new_session=True, env={**os.environ, "ANYVIEW_WORKERS": "2"})
     deadline = time.monotonic() + 180
     while len(os.listdir(tmp_path)) < 2 and time.monotonic() < deadline:

@@ -1,4 +1,4 @@
-"""Units of work done once: an earlier result counts only while its files are what they were."""
+"""Tasks done once: an earlier result counts only while its files are what they were."""
 
 import pytest
 
@@ -6,8 +6,8 @@ from anyview.runtime.once import once
 
 
 @pytest.fixture
-def unit(tmp_path):
-    """A unit that counts how often it is done: (function, list of its calls)."""
+def task(tmp_path):
+    """A task that counts how often it is done: (function, list of its calls)."""
     calls = []
 
     def make():
@@ -15,11 +15,11 @@ def unit(tmp_path):
         (tmp_path / "out.txt").write_text("made")
         return {"value": 0.1 + 0.2, "pair": (1, 2)}, ["out.txt"]
 
-    return lambda: once(tmp_path, "unit", make), calls
+    return lambda: once(tmp_path, "task", make), calls
 
 
-def test_a_result_is_made_once_and_is_the_same_from_the_record(unit):
-    do, calls = unit
+def test_a_result_is_made_once_and_is_the_same_from_the_record(task):
+    do, calls = task
     assert do() == do() == {"value": 0.1 + 0.2, "pair": [1, 2]}
     assert len(calls) == 1
 
@@ -29,17 +29,17 @@ def test_a_result_is_made_once_and_is_the_same_from_the_record(unit):
     [
         ("out.txt", None),
         ("out.txt", b"mad"),
-        ("unit.json", None),
-        ("unit.json", b""),
-        ("unit.json", b'{"result": 1}'),
-        ("unit.json", b'{"files": [], "result": 1}'),
-        ("unit.json", b'{"files": {"../../etc/passwd": "0"}, "result": 1}'),
-        ("unit.json", b"\xff\xfe"),
-        ("unit.json", b'{"files":' * 100_000),
+        ("task.json", None),
+        ("task.json", b""),
+        ("task.json", b'{"result": 1}'),
+        ("task.json", b'{"files": [], "result": 1}'),
+        ("task.json", b'{"files": {"../../etc/passwd": "0"}, "result": 1}'),
+        ("task.json", b"\xff\xfe"),
+        ("task.json", b'{"files":' * 100_000),
     ],
 )
-def test_it_is_made_again_when_file_or_record_is_missing_or_altered(unit, tmp_path, file, content):
-    do, calls = unit
+def test_it_is_made_again_when_file_or_record_is_missing_or_altered(task, tmp_path, file, content):
+    do, calls = task
     first = do()
     (tmp_path / file).unlink() if content is None else (tmp_path / file).write_bytes(content)
     assert do() == first
@@ -52,5 +52,5 @@ def test_a_failed_unit_leaves_no_record(tmp_path):
         raise ValueError("no")
 
     with pytest.raises(ValueError, match="no"):
-        once(tmp_path, "unit", fail)
+        once(tmp_path, "task", fail)
     assert list(tmp_path.iterdir()) == []

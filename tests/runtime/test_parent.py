@@ -9,19 +9,19 @@ from pathlib import Path
 import psutil
 import pytest
 
-UNITS = str(Path(__file__).parent)
+TASKS = str(Path(__file__).parent)
 
 STAGE = f"""
 import os, sys, time
 from pathlib import Path
-sys.path.insert(0, {UNITS!r})
+sys.path.insert(0, {TASKS!r})
 from anyview.runtime.errors import run_stage
-from anyview.runtime.workers import run_units
-from units import hold
+from anyview.runtime.workers import run_tasks
+from tasks import hold
 
 def main(arguments):
     Path(arguments[0], "stage-" + str(os.getpid())).touch()
-    list(run_units(hold, [(arguments[0], 0), (arguments[0], 1)]))
+    list(run_tasks(hold, [(arguments[0], 0), (arguments[0], 1)]))
 
 run_stage(main)
 """

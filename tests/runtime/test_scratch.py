@@ -1,3 +1,6 @@
+import errno
+import fcntl
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -92,10 +95,24 @@ def test_clear_leaves_the_checkpoints_of_a_process_at_work(scratch):
     (scratch_folder("checkpoints", "def") / "checkpoint-a").touch()
     clear_scratch()
     assert (folder / "half").exists()
-    assert list(folder.parent.iterdir()) == [folder]
+    assert {path.name for path in folder.parent.iterdir()} == {folder.name, f"{folder.name}.lock"}
+    process.kill()
     process.communicate()
     clear_scratch()
-    assert not folder.exists()
+    assert not folder.parent.exists()
+
+
+@pytest.mark.parametrize("number", [errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP])
+def test_a_file_system_without_locks_is_used_without_them(scratch, monkeypatch, number):
+    def refuse(descriptor, operation):
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(fcntl, "flock", refuse)
+    folder = scratch_folder("checkpoints", "abc")
+    assert folder.is_dir()
+    assert scratch_folder("checkpoints", "abc") == folder
+    clear_scratch()
+    assert list(scratch.iterdir()) == []
 
 
 def test_a_folder_that_was_removed_is_made_again(scratch):

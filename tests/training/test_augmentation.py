@@ -5,8 +5,8 @@ import pytest
 import torch
 
 from anyview.training.augmentation import Augmentation
-from anyview.training.sampling import Dataset
-from anyview.translator.network import to_input
+from anyview.video.datasets import Dataset
+from anyview.video.pixels import to_input
 from tests.training.discworld import clip_table, disc_clips
 
 COUNT = 60

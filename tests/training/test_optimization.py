@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from torch import nn
 
-from anyview.training.optimization import SharedOptimizer, learning_rate
+from anyview.training.common.optimization import SharedOptimizer, learning_rate
 
 SHAPES = [(4, 3, 5, 5), (4,), (7, 12), (7,), (2, 7), (2,)]
 MAKES = {
@@ -17,8 +17,8 @@ MAKES = {
 }
 
 
-def test_learning_rate_stays_or_falls_along_a_cosine(recipe):
-    constant, cosine = recipe().training, recipe(schedule="cosine").training
+def test_learning_rate_stays_or_falls_along_a_cosine(make_objective):
+    constant, cosine = make_objective().training, make_objective(schedule="cosine").training
     assert [learning_rate(constant, n, 10) for n in (0, 9)] == [0.001, 0.001]
     assert [learning_rate(cosine, n, 10) for n in (0, 5, 10)] == pytest.approx([0.001, 0.0005, 0.0])
 
@@ -35,7 +35,7 @@ def draw(generator: torch.Generator) -> list[torch.Tensor]:
     seed=st.integers(0, 99),
 )
 def test_it_moves_as_one_optimizer_of_the_summed_gradients(kind, threads, parts, missing, seed):
-    """Whatever the shares, and parameters that the loss does not reach stay; also after a restore."""
+    """For any number of threads, and after a restore; parameters that the loss does not reach stay."""
     generator = torch.Generator().manual_seed(seed)
     start = draw(generator)
     ours = [nn.Parameter(tensor.clone()) for tensor in start]

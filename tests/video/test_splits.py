@@ -99,16 +99,16 @@ def test_a_split_table_with_an_unknown_split_is_refused(tmp_path):
 
 @pytest.mark.parametrize(("held_out", "expected"), [(0.25, 5), (3, 3), (20, None)])
 def test_a_simulated_set_is_split_by_a_fraction_or_a_count(tmp_path, root, held_out, expected):
-    folder = tmp_path / "data/sim/diverse"
+    folder = tmp_path / "data/clips/diverse"
     folder.mkdir(parents=True)
     pd.DataFrame({"clip": [f"c{index}" for index in range(20)]}).to_csv(folder / "manifest.csv", index=False)
     shutil.copy(root / "params.yaml", tmp_path)
-    change(tmp_path, {"split.sim.validation": held_out})
-    command = [sys.executable, str(root / "stages/split.py"), "sim-diverse"]
+    change(tmp_path, {"split.diverse.validation": held_out})
+    command = [sys.executable, str(root / "stages/split.py"), "diverse"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     if expected is None:
         assert (done.returncode, "Traceback" in done.stderr) == (2, False)
-        assert "split.sim.validation: 20, but sim-diverse has 20 clips" in done.stderr
+        assert "split.diverse.validation: 20, but diverse has 20 clips" in done.stderr
     else:
-        counts = read_split(tmp_path / "data/splits/sim-diverse.csv")["split"].value_counts()
+        counts = read_split(tmp_path / "data/splits/diverse.csv")["split"].value_counts()
         assert dict(counts) == {"train": 20 - expected, "validation": expected}

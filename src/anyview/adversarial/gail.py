@@ -2,25 +2,34 @@
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
 from anyview import config
-from anyview.adversarial.discriminators import ClipSet, Discriminator, LearnedReward, Views, cross_entropy
-from anyview.learners.common.policies import with_time_bumps
+from anyview.adversarial.common.discriminators import (
+    ClipSet,
+    Discriminator,
+    LearnedReward,
+    Views,
+    cross_entropy,
+)
+from anyview.evaluation.demonstrations import training_clips
+from anyview.evaluation.methods import Group, Scoring, first_demonstration
+from anyview.learners.common.policies import with_time_features
 
 _CHANNELS = (16, 32, 32)
 _WIDTH = 64
-_BUMPS = 10
+_TIME_FEATURES = 10
 _LEAK = 0.2
 
 
 class FrameDiscriminator(Discriminator):
     """D(o_t, t): three strided convolutions on the frame at half its size; time joins the connected layer.
 
-    Time comes as overlapping bumps beside the number: from the number alone the discriminator learns many
-    times slower that the same frame is the expert's at one time and not at another.
+    Time comes as radial basis functions beside the number. From the number alone the discriminator learns
+    many times slower that the same frame is the expert's at one time and not at another.
     """
 
     def __init__(self, image_size: int):
@@ -31,12 +40,12 @@ class FrameDiscriminator(Discriminator):
             layers += [nn.Conv2d(before, channels, 3, stride=2, padding=1), nn.LeakyReLU(_LEAK)]
             before, side = channels, -(-side // 2)
         self.features = nn.Sequential(*layers, nn.Flatten())
-        self.hidden = nn.Linear(before * side**2 + 1 + _BUMPS, _WIDTH)
+        self.hidden = nn.Linear(before * side**2 + 1 + _TIME_FEATURES, _WIDTH)
         self.output = nn.Linear(_WIDTH, 1)
 
     def logits(self, views: Views) -> Tensor:
         """log D/(1 - D), (B,)."""
-        time = with_time_bumps(2 * views.time[:, None] - 1, _BUMPS)
+        time = with_time_features(2 * views.time[:, None] - 1, _TIME_FEATURES)
         inputs = torch.cat([self.features(views.now), time], dim=1)
         return self.output(F.leaky_relu(self.hidden(inputs), _LEAK)).squeeze(1)
 
@@ -58,3 +67,13 @@ def gail_reward(
     size = experts[0].frames.shape[2]
     sets = [{"expert": clips} for clips in experts]
     return LearnedReward(lambda: FrameDiscriminator(size), params, seed, runs, sets, episodes)
+
+
+def make_reward(group: Group) -> Scoring:
+    """The reward of ``group`` against the training split's clips, each in a context of its own."""
+    frames, rows, _ = training_clips(group.params)
+    params, runs = group.params, group.runs
+    experts = [ClipSet(frames, rows)] * len(runs)
+    episodes = params.imitation.trpo.batch_episodes
+    reward = gail_reward(params.adversarial.discriminator, params.base.seed, runs, experts, episodes)
+    return Scoring(reward, np.ones(len(runs)), first_demonstration(group), fixed=False)

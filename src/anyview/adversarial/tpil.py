@@ -2,8 +2,9 @@
 
 Features of a frame serve two heads: the class head tells expert from not, on a pair of frames; the domain
 head tells the expert's view from the agent's, on one frame, and its gradient is reversed on its way into the
-features. So that the view does not give the class away, there is a third set: random motion in the expert's
-views ("bystander").
+features. The view must not give the class away. So there is a third set, the "bystander": random motion in
+the expert's views. The paper's words for the three sets are expert, novice (here the agent) and random policy
+in the expert's domain (here the bystander).
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,13 +15,24 @@ import torch
 from torch import Tensor, nn
 
 from anyview import config
-from anyview.adversarial.discriminators import ClipSet, Discriminator, LearnedReward, Views, cross_entropy
-from anyview.pusher.batch import ACTION_SIZE, ACTIONS, PusherBatch
+from anyview.adversarial.common.discriminators import (
+    ClipSet,
+    Discriminator,
+    LearnedReward,
+    Views,
+    cross_entropy,
+)
+from anyview.evaluation.demonstrations import training_clips
+from anyview.evaluation.methods import Group, Scoring, first_demonstration
+from anyview.pusher.batch import ACTION_SIZE, PusherBatch
 from anyview.pusher.contexts import Context
+from anyview.pusher.episodes import film
+from anyview.seeds import stream
 
 _CHANNELS = 5
 _WIDTH = 128
 _LEAK = 0.2
+_BYSTANDERS = 100  # clips of random motion
 
 
 class ReverseGradient(torch.autograd.Function):
@@ -125,9 +137,19 @@ def random_motion(
 ) -> np.ndarray:
     """Clips (N, T + 1, H, W, 3), one in each context, of an arm whose actions are N(0, ``std``^2)."""
     batch = PusherBatch(contexts, control, image_size)
-    batch.reset()
-    frames = [batch.render()]
-    for _ in range(ACTIONS):
-        batch.step(std * rng.standard_normal((batch.count, ACTION_SIZE)))
-        frames.append(batch.render())
-    return np.stack(frames, axis=1)
+    return film(batch, lambda now: std * rng.standard_normal((batch.count, ACTION_SIZE)))
+
+
+def make_reward(group: Group) -> Scoring:
+    """The reward of ``group`` against the same clips as GAIL, and random motion in the contexts of some."""
+    frames, rows, contexts = training_clips(group.params)
+    params, runs = group.params, group.runs
+    trpo, sim = params.imitation.trpo, params.sim
+    rng = stream(params.base.seed, "bystanders")
+    chosen = [contexts[index] for index in rng.permutation(len(contexts))[:_BYSTANDERS]]
+    motion = random_motion(chosen, rng, trpo.initial_std, sim.control, sim.image_size)
+    experts = [ClipSet(frames, rows)] * len(runs)
+    bystanders = [ClipSet(motion, np.arange(len(motion)))] * len(runs)
+    discriminator, seed = params.adversarial.discriminator, params.base.seed
+    reward = tpil_reward(discriminator, seed, runs, experts, bystanders, trpo.batch_episodes)
+    return Scoring(reward, np.ones(len(runs)), first_demonstration(group), fixed=False)

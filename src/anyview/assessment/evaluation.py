@@ -11,21 +11,22 @@ import torch
 
 from anyview.assessment.importance import feature_weights
 from anyview.assessment.similarity import psnr, ssim
-from anyview.config import Evaluation
+from anyview.config import Assessment
 from anyview.runtime.device import torch_device, use_threads, worker_count
 from anyview.runtime.progress import track
-from anyview.training.sampling import Dataset, clip_pairs
 from anyview.translator.losses import NAMES, alignment_loss, frame_loss
-from anyview.translator.network import ContextTranslator, to_frames, to_input
+from anyview.translator.network import ContextTranslator
+from anyview.video.datasets import Dataset, clip_pairs
 from anyview.video.files import write_video
 from anyview.video.pictures import write_png
+from anyview.video.pixels import to_frames, to_input
 
 _RATE = 10.0  # frames per second of the clips that are written
 _STRIP_STEP = 7
 
 
 @dataclass(frozen=True)
-class Judged:
+class ClipEvaluation:
     """A translated clip: its row of ``clips.csv``; true beside translated frames, uint8 (T, H, 2 W, 3)."""
 
     row: dict[str, str | float]
@@ -45,7 +46,7 @@ def translate_clip(model: ContextTranslator, clip: np.ndarray, context: np.ndarr
 
 
 @torch.inference_mode()
-def judge(model: ContextTranslator, dataset: Dataset, source: int, target: int) -> Judged:
+def evaluate_clip(model: ContextTranslator, dataset: Dataset, source: int, target: int) -> ClipEvaluation:
     """Translate clip ``source`` to the context of clip ``target`` and compare with what happened there.
 
     Losses are on the thesis's scale, means over the clip's frames, all weights 1; ``last_frame`` is L_tr of
@@ -56,11 +57,11 @@ def judge(model: ContextTranslator, dataset: Dataset, source: int, target: int) 
     z2, skips = model.encode_context(true[:1])
     z_true = model.encode_expert(true)
     z3 = model.translate(model.encode_expert(expert), z2.expand_as(z_true))
-    shares = model.decoder.shares(skips)
-    translated = model.decoder(z3, shares)
+    skip_terms = model.decoder.skip_terms(skips)
+    translated = model.decoder(z3, skip_terms)
     losses = [
         float(frame_loss(translated, true)),
-        float(frame_loss(model.decoder(z_true, shares), true)),
+        float(frame_loss(model.decoder(z_true, skip_terms), true)),
         float(alignment_loss(z3, z_true)),
     ]
     shown, wanted = to_frames(translated), np.array(dataset.frames[target])
@@ -76,14 +77,14 @@ def judge(model: ContextTranslator, dataset: Dataset, source: int, target: int) 
         "psnr": psnr(shown, wanted),
         "ssim": ssim(shown, wanted),
     }
-    return Judged(row, np.concatenate((wanted, shown), axis=2))
+    return ClipEvaluation(row, np.concatenate((wanted, shown), axis=2))
 
 
 def evaluate(
     model: ContextTranslator,
     dataset: Dataset,
     folder: Path,
-    params: Evaluation,
+    params: Assessment,
     rng: np.random.Generator,
 ) -> None:
     """Fill ``folder`` with what the translator makes of its held-out clips.
@@ -102,12 +103,12 @@ def evaluate(
         (folder / name).mkdir()
     with track("translate", sum(map(len, chosen.values()))) as tracker:
         for pairs in chosen.values():
-            for index, judged in enumerate(_judge_all(model, dataset, pairs)):
-                rows.append(judged.row)
+            for index, evaluated in enumerate(_evaluate_clips(model, dataset, pairs)):
+                rows.append(evaluated.row)
                 if index < params.shown:
                     name = dataset.clips["clip"].iloc[pairs[index][1]]
-                    write_video(folder / "clips" / f"{name}.avi", judged.frames, _RATE)
-                    write_png(folder / "strips" / f"{name}.png", strip(judged.frames))
+                    write_video(folder / "clips" / f"{name}.avi", evaluated.frames, _RATE)
+                    write_png(folder / "strips" / f"{name}.png", strip(evaluated.frames))
                 tracker.advance()
     _write(folder / "clips.csv", pd.DataFrame(rows))
     _write(
@@ -122,9 +123,11 @@ def strip(frames: np.ndarray) -> np.ndarray:
     return np.concatenate([np.concatenate(list(row), axis=1) for row in (true, translated)])
 
 
-def _judge_all(model: ContextTranslator, dataset: Dataset, pairs: list[tuple[int, int]]) -> Iterator[Judged]:
+def _evaluate_clips(
+    model: ContextTranslator, dataset: Dataset, pairs: list[tuple[int, int]]
+) -> Iterator[ClipEvaluation]:
     with ThreadPoolExecutor(worker_count()) as pool:
-        yield from pool.map(lambda pair: judge(model, dataset, *pair), pairs)
+        yield from pool.map(lambda pair: evaluate_clip(model, dataset, *pair), pairs)
 
 
 def _write(path: Path, table: pd.DataFrame) -> None:

@@ -7,9 +7,10 @@ import pandas as pd
 import torch
 
 from anyview.runtime.device import worker_count
-from anyview.training.sampling import Dataset
 from anyview.translator.losses import FRAME_SCALE
-from anyview.translator.network import ContextTranslator, to_input
+from anyview.translator.network import ContextTranslator
+from anyview.video.datasets import Dataset
+from anyview.video.pixels import to_input
 
 _CLIPS = 20
 
@@ -25,7 +26,7 @@ def feature_weights(
 
     The rise of frame t is the mean rise of L_tr when o_t^i is replaced by frames of ``permutations`` other
     times, over at most 20 ``pairs`` (source, target) of clips. The weight is the rise with negatives clipped
-    to 0, as a share of the sum; where no rise is above 0 every weight is the same.
+    to 0, as a fraction of the sum; if no rise is above 0 every weight is the same.
     """
     offsets = 1 + rng.permutation(dataset.length - 1)[:permutations]
     with ThreadPoolExecutor(worker_count()) as pool:
@@ -45,10 +46,10 @@ def _rises(
     expert, true = (to_input(dataset.frames[clip]).to(device) for clip in pair)
     z1 = model.encode_expert(expert)
     z2, skips = model.encode_context(true[:1])
-    shares = model.decoder.shares(skips)
+    skip_terms = model.decoder.skip_terms(skips)
 
     def losses(features: torch.Tensor) -> torch.Tensor:
-        translated = model.decoder(model.translate(features, z2.expand_as(features)), shares)
+        translated = model.decoder(model.translate(features, z2.expand_as(features)), skip_terms)
         return FRAME_SCALE * (translated - true).square().sum((1, 2, 3))
 
     replaced = torch.stack([losses(z1.roll(-int(offset), dims=0)) for offset in offsets])

@@ -50,7 +50,7 @@ def examine() -> list[Check]:
 def disk_needed(params: Params) -> tuple[float, float]:
     """Bytes that a run needs in the repository (DVC's cache and workspace) and in the scratch folder."""
     size = params.sim.image_size
-    pixels = (params.simulate.diverse.demos + params.simulate.narrow.demos) * 50 * size * size
+    pixels = sum(each.demos for each in params.simulate.sets.values()) * 50 * size * size
     film = params.real.film
     clips = 2 * film.pairs + film.singles + 2 * film.extreme_pairs
     raw = clips * _RAW_FRAMES * film.width * film.width * 9 / 16
@@ -93,6 +93,9 @@ def _dvc() -> Check:
         return Check("dvc", "not installed", "run `make setup`")
     if not Path(".dvc/config").is_file():
         return Check("dvc", f"{version}, no repository here", "run from the root of a clone of Anyview")
+    if not str(Path.cwd()).isascii():
+        advice = "move the clone to a path of ASCII letters: DVC's queue fails here (all else works)"
+        return Check("dvc", f"{version}, in a path with letters outside ASCII", advice)
     return Check("dvc", version)
 
 

@@ -1,64 +1,26 @@
-"""The ``anyview`` command."""
+"""The ``anyview`` command: its commands in the order of ``anyview --help``.
+
+No module of a command imports anything heavy before the command runs, so that help and completion are fast.
+"""
 
 import json
-from collections.abc import Callable
 from dataclasses import asdict
-from importlib import import_module
 from importlib.metadata import version
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, NoReturn
 
 import typer
 from rich.console import Console
-from typer.core import TyperCommand, TyperGroup
 
+from anyview.cli.clips import clips
+from anyview.cli.record import record
+from anyview.cli.review import review, sweep
+from anyview.cli.translate import translate
+from anyview.cli.watch import watch
 from anyview.runtime.errors import AnyviewError, exit_code
 
 _NOT_FIT = 1  # exit code: nothing was wrong with the input, but the answer is no
 
-# The commands of the other packages: where they are, and the line that stands for them in `anyview --help`,
-# so that no command has to wait for the imports of another.
-_ELSEWHERE = {
-    "record": ("anyview.cli.clips", "Film one demonstration with one or two webcams at once."),
-    "clips": (
-        "anyview.cli.clips",
-        "List the clips that there are, by kind, split and source, and the refused with the reason.",
-    ),
-    "translate": ("anyview.cli.translate", "Translate a clip to another viewpoint."),
-    "watch": ("anyview.cli.watch", "Watch a trained policy act, seen from its own camera."),
-    "review": (
-        "anyview.cli.review",
-        "Summarise what changed since REV: params, metrics beyond their intervals, strips, stages rerun.",
-    ),
-    "sweep": (
-        "anyview.cli.review",
-        "Draw what a sweep of KEY by `dvc exp` did to the metrics, as one picture and one table.",
-    ),
-}
-
-
-class _Elsewhere(TyperCommand):
-    """A command whose module is imported when it is called."""
-
-    def make_context(self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any) -> Any:
-        assert self.name is not None
-        return _load(self.name).make_context(info_name, args, parent=parent, **extra)
-
-
-class _Commands(TyperGroup):
-    """The commands of this module and, in a fixed order, those from elsewhere."""
-
-    def list_commands(self, ctx: Any) -> list[str]:
-        here = super().list_commands(ctx)
-        return [*(name for name in here if name != "clean"), *_ELSEWHERE, "clean"]
-
-    def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        if cmd_name in _ELSEWHERE:
-            return _Elsewhere(cmd_name, help=_ELSEWHERE[cmd_name][1], callback=lambda: None)
-        return super().get_command(ctx, cmd_name)
-
-
 app = typer.Typer(
-    cls=_Commands,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -85,7 +47,6 @@ def _anyview(
     """
 
 
-@app.command()
 def doctor(as_json: Annotated[bool, typer.Option("--json", help="Print JSON for a script.")] = False) -> None:
     """Look whether this machine is fit for the active profile, and say what to do where it is not."""
     from anyview.cli.doctor import examine
@@ -112,7 +73,6 @@ def _names_of_profiles() -> list[str]:
     return profile_names()
 
 
-@app.command()
 def profile(
     name: Annotated[
         str | None,
@@ -155,7 +115,6 @@ def profile(
         print(f"params.yaml has profile {name}; `dvc repro` runs what that changes")
 
 
-@app.command()
 def clean(as_json: Annotated[bool, typer.Option("--json", help="Print JSON for a script.")] = False) -> None:
     """Empty the scratch folder: checkpoints and decoded frames that no stage at work needs."""
     from anyview.runtime.scratch import clear_scratch, scratch_root
@@ -167,18 +126,8 @@ def clean(as_json: Annotated[bool, typer.Option("--json", help="Print JSON for a
         print(f"{folder}: {freed / 1e6:.0f} MB freed")
 
 
-def _load(name: str) -> Any:
-    """The real command ``name`` of another package: the function of that name in its module, or a group."""
-    found: Callable[..., Any] | typer.Typer
-    try:
-        found = getattr(import_module(_ELSEWHERE[name][0]), name)
-    except ModuleNotFoundError as error:
-        raise AnyviewError(f"{name}: {error}; run `make setup`") from None
-    if isinstance(found, typer.Typer):
-        return typer.main.get_group(found)
-    alone = typer.Typer(add_completion=False, context_settings={"help_option_names": ["-h", "--help"]})
-    alone.command(name)(found)
-    return typer.main.get_command(alone)
+for command in (doctor, profile, record, clips, translate, watch, review, sweep, clean):
+    app.command()(command)
 
 
 def main() -> NoReturn:
@@ -189,6 +138,8 @@ def main() -> NoReturn:
 def _run() -> None:
     try:
         app(prog_name="anyview")
+    except ModuleNotFoundError as error:
+        raise AnyviewError(f"{error}; run `make setup`") from None
     except SystemExit as ended:
         if ended.code:
             raise

@@ -1,11 +1,12 @@
 """What clips there are: raw, finished and refused, by kind and split."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
+from anyview import paths
 from anyview.config import read_yaml
 from anyview.ingest.raw_manifest import read_raw_manifest
 from anyview.runtime.errors import AnyviewError
@@ -13,26 +14,21 @@ from anyview.video.manifests import KINDS, read_table
 from anyview.video.splits import SPLITS, read_split
 
 UNUSED = "unused"
-_RAW = {"surrogate": Path("data/real/surrogate"), "recorded": Path("data/real/raw")}
-_SETS = {
-    "sim-diverse": Path("data/sim/diverse"),
-    "sim-narrow": Path("data/sim/narrow"),
-    "real": Path("data/real/clips"),
-}
 _SHOWN = 20  # refused clips in the text
 
 
-def survey(source: str) -> dict[str, Any]:
+def survey(source: str, names: Iterable[str]) -> dict[str, Any]:
     """Counts for JSON: raw clips by origin, sets by split, real clips by kind and split, and the refused.
 
-    ``source`` is the origin that the finished real clips have, ``surrogate`` or ``recorded``.
+    ``source`` is the origin of the real clips, ``surrogate`` or ``recorded``; ``names`` are the sets'.
     """
-    manifests = {origin: folder / "manifest.csv" for origin, folder in _RAW.items()}
+    manifests = {origin: paths.raw(origin) / "manifest.csv" for origin in ("surrogate", "recorded")}
     raw = {origin: len(read_raw_manifest(path)) if path.exists() else 0 for origin, path in manifests.items()}
-    sets = {name: _by_split(name, folder) for name, folder in _SETS.items()}
-    clips = _split_of(_table(_SETS["real"] / "manifest.csv", ["clip", "kind"]), "real")
+    sets = {name: _by_split(name) for name in names}
+    real = paths.clip_set(paths.REAL)
+    clips = _split_of(_table(real / "manifest.csv", ["clip", "kind"]), paths.REAL)
     kinds = {kind: _count(clips["split"][clips["kind"] == kind]) for kind in KINDS}
-    refused = _table(_SETS["real"] / "refused.csv", ["file", "reason"]).to_dict("records")
+    refused = _table(real / "refused.csv", ["file", "reason"]).to_dict("records")
     return {"source": source, "raw": raw, "sets": sets, "kinds": kinds, "refused": refused}
 
 
@@ -59,20 +55,20 @@ def lines(found: dict[str, Any]) -> Iterator[str]:
     for row in found["refused"][:_SHOWN]:
         yield f"  {row['file']}: {row['reason']}"
     if len(found["refused"]) > _SHOWN:
-        yield f"  and more: see {_SETS['real'] / 'refused.csv'}"
+        yield f"  and more: see {paths.clip_set(paths.REAL) / 'refused.csv'}"
 
 
 def _table(path: Path, columns: list[str]) -> pd.DataFrame:
     return read_table(path, columns) if path.exists() else pd.DataFrame(columns=columns)
 
 
-def _by_split(name: str, folder: Path) -> dict[str, int]:
-    return _count(_split_of(_table(folder / "manifest.csv", ["clip"]), name)["split"])
+def _by_split(name: str) -> dict[str, int]:
+    return _count(_split_of(_table(paths.clip_set(name) / "manifest.csv", ["clip"]), name)["split"])
 
 
 def _split_of(clips: pd.DataFrame, name: str) -> pd.DataFrame:
     """``clips`` with a column ``split``; before `split` has run, all are unused."""
-    path = Path("data/splits") / f"{name}.csv"
+    path = paths.split_table(name)
     place = read_split(path).set_index("clip")["split"] if path.exists() else pd.Series(dtype=str)
     return clips.assign(split=clips["clip"].map(place).fillna(UNUSED))
 

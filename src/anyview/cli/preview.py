@@ -9,7 +9,7 @@ from typing import Any
 
 import cv2
 
-from anyview.cli.recording import Camera
+from anyview.cli.cameras import Camera
 from anyview.runtime.errors import AnyviewError
 
 _FRAMES_PER_SECOND = 10

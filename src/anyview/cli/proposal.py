@@ -11,7 +11,7 @@ from anyview.ingest.normalize import Refused, parse_stretch, read_clip
 from anyview.ingest.raw_manifest import read_raw_manifest
 from anyview.runtime.errors import AnyviewError
 from anyview.runtime.outputs import write_atomically
-from anyview.runtime.workers import run_units
+from anyview.runtime.workers import run_tasks
 from anyview.video.manifests import propose_manifest
 from anyview.video.pictures import contact_sheet, write_png
 
@@ -30,10 +30,10 @@ def propose(folder: Path, limits: Ingest) -> tuple[pd.DataFrame, dict[str, str]]
     table, reasons = propose_stretches(folder, manifest)
     write_atomically(folder / "manifest.proposed.csv", table.to_csv(index=False))
     rows = [row for row in table.to_dict("records") if row["start"] and row["file"] not in reasons]
-    units = [(folder / row["file"], limits, row["start"], row["end"]) for row in rows]
+    tasks = [(folder / row["file"], limits, row["start"], row["end"]) for row in rows]
     shown: list[np.ndarray] = []
     labels: list[str] = []
-    for row, clip in zip(rows, run_units(_clip_or_reason, units), strict=True):
+    for row, clip in zip(rows, run_tasks(_clip_or_reason, tasks), strict=True):
         if isinstance(clip, str):
             reasons[row["file"]] = clip
         else:

@@ -2,6 +2,7 @@
 
 import types
 from pathlib import Path
+from types import NoneType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import annotated_types
@@ -20,7 +21,11 @@ file (an unknown key, another type, a value out of range) is refused by its name
 
 def params_reference(params: Params) -> str:
     """The reference as Markdown, with the values of ``params``."""
-    return _HEAD + "".join(_block(name, getattr(params, name)) for name in Params.model_fields)
+    return _HEAD + "".join(_section(name, getattr(params, name)) for name in Params.model_fields)
+
+
+def _section(key: str, value: BaseModel | dict[str, BaseModel]) -> str:
+    return _cells(key, value) if isinstance(value, dict) else _block(key, value)
 
 
 def _block(prefix: str, block: BaseModel) -> str:
@@ -28,10 +33,8 @@ def _block(prefix: str, block: BaseModel) -> str:
     rows, nested = [], []
     for name, field in type(block).model_fields.items():
         value, key = getattr(block, name), f"{prefix}.{name}"
-        if isinstance(value, BaseModel):
-            nested.append(_block(key, value))
-        elif isinstance(value, dict):
-            nested.append(_cells(key, value))
+        if isinstance(value, BaseModel | dict):
+            nested.append(_section(key, value))
         else:
             rows.append(f"| `{key}` | {_kind(field)} | `{_shown(value)}` | {_about(field)} |\n")
     table = "| key | type | default | meaning |\n|---|---|---|---|\n" + "".join(rows) + "" if rows else ""
@@ -43,9 +46,9 @@ def _cells(key: str, cells: dict[str, BaseModel]) -> str:
     text = ""
     for kind in dict.fromkeys(type(cell) for cell in cells.values()):
         names = [name for name, cell in cells.items() if type(cell) is kind]
-        text += f"\n## `{key}.<cell>`: {(kind.__doc__ or '').strip()}\n\n"
+        text += f"\n## `{key}.<name>`: {(kind.__doc__ or '').strip()}\n\n"
         text += (
-            f"Cells: {', '.join(f'`{name}`' for name in names)}.\n\n| key | type | meaning |\n|---|---|---|\n"
+            f"Names: {', '.join(f'`{name}`' for name in names)}.\n\n| key | type | meaning |\n|---|---|---|\n"
         )
         for name, field in kind.model_fields.items():
             text += f"| `{name}` | {_kind(field)} | {_about(field)} |\n"
@@ -87,7 +90,7 @@ def _type_name(annotation: Any) -> str:
         return f"list of ({_type_name(get_args(annotation)[0])})"
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return "block of " + ", ".join(f"`{name}`" for name in annotation.model_fields)
-    names = {int: "whole number", float: "number", str: "text", bool: "true or false"}
+    names = {int: "whole number", float: "number", str: "text", bool: "true or false", NoneType: "absent"}
     return names.get(annotation, str(annotation))
 
 

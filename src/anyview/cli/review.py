@@ -3,13 +3,10 @@
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from anyview.report.review import MetricChange, compare
-from anyview.report.review_markdown import to_markdown
-from anyview.report.revisions import Revision, find_revision
 from anyview.runtime.errors import AnyviewError
 from anyview.runtime.outputs import write_atomically
 
@@ -26,29 +23,37 @@ def review(
     images: Annotated[
         str | None,
         typer.Option(
-            "--images", metavar="URL", help="Show strips from URL/COMMIT/PATH instead of naming paths."
+            "--images", metavar="URL", help="Show pictures from URL/COMMIT/PATH instead of naming paths."
         ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON for a script.")] = False,
 ) -> None:
-    """Summarise what changed since REV: params, metrics beyond their intervals, strips, stages rerun.
+    """Summarise what changed since REV: metrics beyond their intervals, params, pictures, stages rerun.
 
-    Prints Markdown, made to be pasted or posted into a pull request.
+    Prints Markdown for a pull request: a screenful of metrics beyond their intervals, the rest folded.
     """
+    from anyview.review.changes import compare
+    from anyview.review.markdown import to_markdown
+    from anyview.review.revisions import Revision, find_revision
+
     root = Path()
     before = find_revision(root, revision)
     after = find_revision(root, to) if to else Revision(root)
     changes = compare(before, after)
     if as_json:
-        values: dict[str, Any] = asdict(changes)
-        values["metrics"] = [_metric(change) for change in changes.metrics]
-        print(json.dumps(values, indent=2))
+        metrics = [
+            asdict(change) | {"beyond_intervals": change.beyond_intervals} for change in changes.metrics
+        ]
+        states = {"before": before.name, "after": after.name}
+        print(json.dumps(asdict(changes) | states | {"metrics": metrics}, indent=2, default=str))
     else:
-        print(to_markdown(changes, before, after, images), end="")
+        print(to_markdown(changes, images), end="")
 
 
 def sweep(
-    key: Annotated[str, typer.Argument(metavar="KEY", help="Of params.yaml, such as imitation.reward.phi.")],
+    key: Annotated[
+        str, typer.Argument(metavar="KEY", help="Of params.yaml, such as imitation.cells.ours.weights.image.")
+    ],
     metric: Annotated[
         list[str] | None,
         typer.Option(
@@ -64,11 +69,11 @@ def sweep(
 ) -> None:
     """Draw what a sweep of KEY by `dvc exp` did to the metrics, as one picture and one table.
 
-    Counts the experiments of the current commit that differ from it in KEY alone, and the commit itself.
+    Shows the current commit and its finished experiments that differ from it in KEY alone.
     """
     from anyview.report.figures.style import to_png, to_svg
-    from anyview.report.figures.sweep import sweep as draw
-    from anyview.report.sweeps import read_sweep, table
+    from anyview.review.sweep_figure import sweep as draw
+    from anyview.review.sweeps import read_sweep, table
 
     if output.suffix not in (".svg", ".png"):
         raise AnyviewError(f"{output}: the picture must end in .svg or .png")
@@ -76,25 +81,9 @@ def sweep(
     figure = draw(found)
     write_atomically(output, to_png(figure) if output.suffix == ".png" else to_svg(figure))
     if as_json:
-        trials = [
-            {
-                "experiment": trial.name,
-                "value": trial.params[key],
-                "metrics": {name: asdict(trial.metrics[name]) for name in found.metrics},
-            }
-            for trial in found.trials
-        ]
-        print(
-            json.dumps(
-                {"key": key, "output": str(output), "left_out": found.left_out, "trials": trials}, indent=2
-            )
-        )
+        print(json.dumps(asdict(found) | {"output": str(output)}, indent=2))
         return
-    print("\n".join(table(found)))
+    print(table(found))
     if found.left_out:
-        print(f"left out: {found.left_out} that vary something else too, or have no such metrics yet")
+        print(f"left out: {found.left_out} that vary something else too, or have no such metrics")
     print(f"drawn: {output}")
-
-
-def _metric(change: MetricChange) -> dict[str, Any]:
-    return {**asdict(change), "beyond": change.beyond}

@@ -6,6 +6,8 @@ from typing import Annotated
 
 import typer
 
+from anyview import paths
+
 
 def translate(
     clip: Annotated[Path, typer.Argument(help="The expert's clip: any video.")],
@@ -33,7 +35,7 @@ def translate(
 
     if output.suffix != ".avi":
         raise AnyviewError(f"{output}: the output must end in .avi")
-    translator = load_translator(model if model.is_dir() else Path("data/models") / model)
+    translator = load_translator(model if model.is_dir() else paths.model(str(model)))
     frames, rate = read_clip(clip, translator.image_size)
     view = read_view(context, translator.image_size)
     translated = translate_clip(translator.to(torch_device()), frames, view)

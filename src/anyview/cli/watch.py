@@ -2,14 +2,16 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from anyview.video.files import Codec
+from anyview import paths
 
-POLICIES = Path("data/policies")
-CODECS: dict[str, Codec] = {".mp4": "XVID", ".avi": "FFV1"}
+if TYPE_CHECKING:
+    from anyview.video.files import Codec
+
+CODECS: dict[str, "Codec"] = {".mp4": "XVID", ".avi": "FFV1"}
 
 
 def watch(
@@ -22,10 +24,9 @@ def watch(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON for a script.")] = False,
 ) -> None:
     """Watch a trained policy act, seen from its own camera."""
-    import numpy as np
-
     from anyview.learners.common.policies import load_policy
-    from anyview.pusher.batch import ACTIONS, TOLERANCE, PusherBatch
+    from anyview.pusher.batch import TOLERANCE, PusherBatch
+    from anyview.pusher.episodes import film
     from anyview.runtime.errors import AnyviewError
     from anyview.video.files import write_video
 
@@ -33,17 +34,14 @@ def watch(
         raise AnyviewError(f"{output}: the output must end in {' or '.join(CODECS)}")
     if size % 2:
         raise AnyviewError(f"--size {size}: must be even")
-    there = sorted(folder.name for folder in POLICIES.glob("*/"))
+    folder = paths.policies(cell)
+    there = sorted(each.name for each in folder.parent.glob("*/"))
     if cell not in there:
         raise AnyviewError(f"{cell}: no such method was evaluated; there are {', '.join(there) or 'none'}")
-    policy = load_policy(POLICIES / cell, run)
+    policy = load_policy(folder, run)
     pusher = PusherBatch([policy.context], policy.control, size)
-    observation = pusher.reset()[0]
-    frames = [pusher.render()[0]]
-    for _ in range(ACTIONS):
-        observation = pusher.step(policy.act(observation)[None])[0]
-        frames.append(pusher.render()[0])
-    write_video(output, np.stack(frames), 10.0, CODECS[output.suffix])
+    frames = film(pusher, lambda now: policy.act(now.observations[0])[None])[0]
+    write_video(output, frames, 10.0, CODECS[output.suffix])
     distance = float(pusher.distance()[0])
     success = distance < TOLERANCE
     if as_json:

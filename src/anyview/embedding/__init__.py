@@ -1,1 +1,1 @@
-"""The time-contrastive embedding of the `tcn` baseline."""
+"""The time-contrastive embedding of the `tcn` baseline: network, loss, weights on disk."""

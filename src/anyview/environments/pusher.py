@@ -19,16 +19,19 @@ from anyview.pusher.batch import (
     OBSERVATION_SIZE,
     TOLERANCE,
     PusherBatch,
+    finite_actions,
 )
 from anyview.pusher.contexts import Context, Kind, sample_contexts
 
-_OBSERVATION_SPACE = gym.spaces.Box(-OBSERVATION_LIMIT, OBSERVATION_LIMIT, (OBSERVATION_SIZE,), np.float32)
-_ACTION_SPACE = gym.spaces.Box(-1.0, 1.0, (ACTION_SIZE,), np.float32)
 _METADATA = {"render_modes": ["rgb_array"], "render_fps": 10}
+_BEFORE_RESET = "the environment has no episode yet: call reset() first"
 
 
 class PusherEnv(gym.Env):
-    """One pusher. A reset draws a new context of ``kind``, unless ``context`` fixes it."""
+    """One pusher. A reset draws a new context of ``kind``, unless ``context`` fixes it.
+
+    Raises ValueError where an argument, an option or an action is not what it has to be.
+    """
 
     metadata: dict[str, Any] = _METADATA
 
@@ -41,23 +44,27 @@ class PusherEnv(gym.Env):
         render_mode: str | None = None,
     ):
         _check_choices(kind, control)
-        self.observation_space = _OBSERVATION_SPACE
-        self.action_space = _ACTION_SPACE
+        self.observation_space, self.action_space = _spaces()
         self.render_mode = render_mode
-        self._context, self._kind, self._control, self._image_size = context, kind, control, image_size
+        self._context = None if context is None else _checked_context(context)
+        self._kind, self._control, self._image_size = kind, control, image_size
         self._batch: PusherBatch | None = None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
         """Start an episode; ``options={"context": ...}`` chooses its context."""
         super().reset(seed=seed)
-        context = (options or {}).get("context", self._context) or _draw(self.np_random, self._kind)
-        self._batch = PusherBatch([context], self._control, self._image_size)
+        _check_options(options, "context")
+        context = _checked_context(options["context"]) if options else self._context
+        self._batch = PusherBatch(
+            [context or _draw(self.np_random, self._kind)], self._control, self._image_size
+        )
         return self._batch.reset()[0], _info(self._batch, 0)
 
     def step(self, action: np.ndarray):
-        """Act for 0.1 s."""
-        assert self._batch is not None, "reset comes first"
-        observation = self._batch.step(np.asarray(action)[None])[0]
+        """Act for 0.1 s with ``action`` (3,), finite."""
+        if self._batch is None:
+            raise gym.error.ResetNeeded(_BEFORE_RESET)
+        observation = self._batch.step(finite_actions(action, (ACTION_SIZE,))[None])[0]
         info = _info(self._batch, 0)
         return observation, -info["distance"], False, self._batch.steps >= ACTIONS, info
 
@@ -65,12 +72,16 @@ class PusherEnv(gym.Env):
         """The context's camera image (H, W, 3) uint8, where ``render_mode`` is "rgb_array"."""
         if self.render_mode is None:
             return None
-        assert self._batch is not None, "reset comes first"
+        if self._batch is None:
+            raise gym.error.ResetNeeded(_BEFORE_RESET)
         return self._batch.render()[0]
 
 
 class PusherVectorEnv(VectorEnv):
-    """``num_envs`` pushers on one ``mujoco.batch.Batch``, equal step for step to as many single ones."""
+    """``num_envs`` pushers on one ``mujoco.batch.Batch``, equal step for step to as many single ones.
+
+    Raises ValueError where an argument, an option or an action is not what it has to be.
+    """
 
     metadata: dict[str, Any] = {**_METADATA, "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
 
@@ -87,16 +98,20 @@ class PusherVectorEnv(VectorEnv):
             raise ValueError(f"{len(contexts)} contexts for {num_envs} environments")
         _check_choices(kind, control)
         self.num_envs = num_envs
-        self.single_observation_space, self.single_action_space = _OBSERVATION_SPACE, _ACTION_SPACE
-        self.observation_space = batch_space(_OBSERVATION_SPACE, num_envs)
-        self.action_space = batch_space(_ACTION_SPACE, num_envs)
+        self.single_observation_space, self.single_action_space = _spaces()
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
         self.render_mode = render_mode
-        self._contexts, self._kind, self._control, self._image_size = contexts, kind, control, image_size
+        self._contexts = None if contexts is None else [_checked_context(context) for context in contexts]
+        self._kind, self._control, self._image_size = kind, control, image_size
         self._generators: list[np.random.Generator] = []
         self._batch: PusherBatch | None = None
 
     def reset(self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None):
         """Start an episode everywhere; an integer ``seed`` seeds environment i with ``seed + i``."""
+        _check_options(options)
+        if isinstance(seed, Sequence) and len(seed) != self.num_envs:
+            raise ValueError(f"{len(seed)} seeds for {self.num_envs} environments")
         if seed is not None or not self._generators:
             seeds = [seed + i if isinstance(seed, int) else seed for i in range(self.num_envs)]
             if isinstance(seed, Sequence):
@@ -107,11 +122,14 @@ class PusherVectorEnv(VectorEnv):
         return self._batch.reset(), self._info()
 
     def step(self, actions: np.ndarray):
-        """Act for 0.1 s everywhere; the step after the last one of an episode resets instead."""
-        assert self._batch is not None, "reset comes first"
-        ended = self._batch.steps >= ACTIONS
+        """Act for 0.1 s everywhere with ``actions`` (num_envs, 3), finite.
+
+        The step after the last one of an episode resets instead, whatever its actions.
+        """
+        if self._batch is None:
+            raise gym.error.ResetNeeded(_BEFORE_RESET)
         never = np.zeros(self.num_envs, bool)
-        if ended:
+        if self._batch.steps >= ACTIONS:
             observations, info = self.reset()
             return observations, np.zeros(self.num_envs), never, never.copy(), info
         observations = self._batch.step(actions)
@@ -122,7 +140,8 @@ class PusherVectorEnv(VectorEnv):
         """Every context's camera image, where ``render_mode`` is "rgb_array"."""
         if self.render_mode is None:
             return None
-        assert self._batch is not None, "reset comes first"
+        if self._batch is None:
+            raise gym.error.ResetNeeded(_BEFORE_RESET)
         return tuple(self._batch.render())
 
     def _info(self) -> dict[str, Any]:
@@ -137,6 +156,12 @@ class PusherVectorEnv(VectorEnv):
         }
 
 
+def _spaces() -> tuple[gym.spaces.Box, gym.spaces.Box]:
+    """The spaces of observations and actions, new for each environment: a space has a random generator."""
+    observations = gym.spaces.Box(-OBSERVATION_LIMIT, OBSERVATION_LIMIT, (OBSERVATION_SIZE,), np.float32)
+    return observations, gym.spaces.Box(-1.0, 1.0, (ACTION_SIZE,), np.float32)
+
+
 def _draw(rng: np.random.Generator, kind: Kind) -> Context:
     return sample_contexts(rng, 1, kind)[0][0]
 
@@ -148,6 +173,18 @@ def _check_choices(kind: str, control: str) -> None:
     ):
         if value not in choices:
             raise ValueError(f"{name} {value!r}: must be {' or '.join(choices)}")
+
+
+def _checked_context(context: Any) -> Context:
+    if not isinstance(context, Context):
+        raise ValueError(f"context: expected a Context (see anyview.pusher.contexts), got {context!r}")
+    return context
+
+
+def _check_options(options: dict[str, Any] | None, *known: str) -> None:
+    for name in options or {}:
+        if name not in known:
+            raise ValueError(f"options: {name!r}: expected {' or '.join(map(repr, known)) or 'none'}")
 
 
 def _info(batch: PusherBatch, index: int) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from anyview import config
+from anyview.config import RewardWeights
 from anyview.rewards.demonstration import DemonstrationReward, translate_demonstrations
 from anyview.translator.network import ContextTranslator
 
@@ -19,10 +19,16 @@ class TranslatedReward(gym.Wrapper):
     """
 
     def __init__(
-        self, env: gym.Env, model: ContextTranslator, demonstrations: np.ndarray, params: config.Reward
+        self,
+        env: gym.Env,
+        model: ContextTranslator,
+        demonstrations: np.ndarray,
+        weights: RewardWeights,
+        time_power: float = 0.0,
     ):
         super().__init__(env)
-        self._model, self._demonstrations, self._params = model, demonstrations, params
+        self._model, self._demonstrations = model, demonstrations
+        self._weights, self._time_power = weights, time_power
         self._first: np.ndarray | None = None
         self._steps = 0
 
@@ -32,7 +38,9 @@ class TranslatedReward(gym.Wrapper):
         first = self._see()
         if self._first is None or not np.array_equal(first, self._first):
             targets = translate_demonstrations(self._model, self._demonstrations, first[None])
-            self._reward = DemonstrationReward(self._model, *targets, first[None], self._params)
+            self._reward = DemonstrationReward(
+                self._model, *targets, first[None], self._weights, self._time_power
+            )
             self._first = first
         self._steps = 0
         return observation, info

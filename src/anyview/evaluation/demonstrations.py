@@ -1,18 +1,14 @@
 """The clips of the expert: those that agents imitate, and those that discriminators learn from."""
 
-from pathlib import Path
-
 import numpy as np
 
+from anyview import paths
 from anyview.config import Params
 from anyview.pusher.contexts import Context
 from anyview.runtime.errors import AnyviewError
 from anyview.seeds import stream
 from anyview.video.sets import FrameStore, open_frames
 from anyview.video.splits import read_split
-
-DEMONSTRATIONS = Path("data/sim/diverse")
-SPLIT = Path("data/splits/sim-diverse.csv")
 
 
 def imitated_demonstrations(params: Params) -> tuple[list[str], np.ndarray]:
@@ -21,10 +17,11 @@ def imitated_demonstrations(params: Params) -> tuple[list[str], np.ndarray]:
     Raises AnyviewError where the split holds out fewer, or the frames are of another size than the agents'.
     """
     store, rows = _split_rows(params, "validation")
-    wanted = params.imitation.reward.demonstrations
+    wanted = params.imitation.demonstrations
     if len(rows) < wanted:
+        table = paths.split_table(params.imitation.dataset)
         raise AnyviewError(
-            f"params.yaml: imitation.reward.demonstrations: {wanted}, but {SPLIT} holds out {len(rows)} clips"
+            f"params.yaml: imitation.demonstrations: {wanted}, but {table} holds out {len(rows)} clips"
         )
     chosen = np.sort(stream(params.base.seed, "imitated").choice(rows, wanted, replace=False))
     return list(store.manifest["clip"].iloc[chosen]), np.stack([store.frames[row] for row in chosen])
@@ -37,15 +34,17 @@ def training_clips(params: Params) -> tuple[np.ndarray, np.ndarray, list[Context
     """
     store, rows = _split_rows(params, "train")
     if "context" not in store.manifest:
-        raise AnyviewError(f"{DEMONSTRATIONS}/manifest.csv: no column context; run the simulate stage again")
+        manifest = paths.clip_set(params.imitation.dataset) / "manifest.csv"
+        raise AnyviewError(f"{manifest}: no column context; run the simulate stage again")
     return store.frames, rows, [Context.from_json(text) for text in store.manifest["context"].iloc[rows]]
 
 
 def _split_rows(params: Params, split: str) -> tuple[FrameStore, np.ndarray]:
-    store = open_frames(DEMONSTRATIONS)
+    folder = paths.clip_set(params.imitation.dataset)
+    store = open_frames(folder)
     made, size = store.frames.shape[2], params.sim.image_size
     if made != size:
-        raise AnyviewError(f"{DEMONSTRATIONS}: frames of {made} pixels, but sim.image_size is {size}")
-    table = read_split(SPLIT)
+        raise AnyviewError(f"{folder}: frames of {made} pixels, but sim.image_size is {size}")
+    table = read_split(paths.split_table(params.imitation.dataset))
     members = set(table["clip"][table["split"] == split])
     return store, np.flatnonzero(store.manifest["clip"].isin(members))

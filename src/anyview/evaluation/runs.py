@@ -2,16 +2,18 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from anyview.config import Params
-from anyview.evaluation.methods import Group, Scoring, make_learner, make_reward
+from anyview.evaluation.methods import Group, Method, Scoring
 from anyview.learners.common.interfaces import Arrays, Learner, RewardSource
-from anyview.pusher.batch import ACTIONS, FRAMES, TOLERANCE, PusherBatch
+from anyview.pusher.batch import FRAMES, TOLERANCE, PusherBatch
 from anyview.pusher.contexts import Context
+from anyview.pusher.episodes import Act, Moment, episode, film
 from anyview.pusher.expert import roll_out
 from anyview.pusher.render import renderer
 from anyview.runtime.checkpoints import Checkpoints
@@ -44,6 +46,7 @@ def groups_of(runs: int) -> list[range]:
 def evaluate_group(
     name: str,
     params: Params,
+    method: Method,
     runs: Sequence[int],
     contexts: Sequence[Context],
     demonstrations: np.ndarray,
@@ -56,8 +59,8 @@ def evaluate_group(
     use_threads(1)
     positions, _ = roll_out(contexts)
     own = _film(params, contexts, positions)
-    group = Group(params, params.imitation.cells[name], runs, contexts, demonstrations, own)
-    learner, scoring = make_learner(group), make_reward(group)
+    group = Group(params, params.methods[name], runs, contexts, demonstrations, own)
+    learner, scoring = method.make_learner(params, runs), method.make_reward(group)
     label = f"{name}, runs {runs[0]} to {runs[-1]}"
     curve = _train(label, group, learner, scoring, Checkpoints(scratch))
 
@@ -68,7 +71,7 @@ def evaluate_group(
         "final_distance": distance,
         "return_policy": _returns(scoring, agent),
     }
-    if scoring.judges:
+    if scoring.fixed:
         without_object = positions.copy()
         without_object[:, :, 3:] = positions[:, :1, 3:]
         columns |= {
@@ -108,7 +111,7 @@ def _train(
         for iteration in range(start + 1, params.iterations + 1):
             earned = explore(acting, learner, scoring.reward, len(group.runs))
             learner.end_iteration()
-            since.append({"return": earned * scoring.units, **scoring.reward.end_iteration()})
+            since.append({"return": earned * scoring.scales, **scoring.reward.end_iteration()})
             note = ""
             if iteration in points:
                 distance = _final_distance(testing, learner)
@@ -139,43 +142,45 @@ def explore(batch: PusherBatch, learner: Learner, reward: RewardSource, runs: in
 
     Returns what they earned (R,), the mean over a run's copies.
     """
-    shape = (runs, batch.count // runs)
-    observations = batch.reset().reshape(*shape, -1)
-    earned = np.zeros(shape)
-    for step in range(1, ACTIONS + 1):
-        actions = learner.act(observations, explore=True)
-        following = batch.step(actions.reshape(batch.count, -1)).reshape(*shape, -1)
-        frames = batch.render()
-        rewards = reward.step(frames.reshape(*shape, *frames.shape[1:]), step)
-        learner.record(observations, actions, rewards, following, step)
+    copies = batch.count // runs
+
+    def by_run(array: np.ndarray) -> np.ndarray:
+        return array.reshape(runs, copies, *array.shape[1:])
+
+    def act(now: Moment) -> np.ndarray:
+        return learner.act(by_run(now.observations), explore=True).reshape(batch.count, -1)
+
+    earned = np.zeros((runs, copies))
+    for before, now in pairwise(episode(batch, act)):
+        rewards = reward.step(by_run(batch.render()), now.step)
+        observations, actions = by_run(before.observations), by_run(now.actions)
+        learner.record(observations, actions, rewards, by_run(now.observations), now.step)
         earned += rewards
-        observations = following
     return earned.mean(axis=1)
 
 
 def _final_distance(batch: PusherBatch, learner: Learner) -> np.ndarray:
     """Metres (R,) from object to goal after an episode without noise."""
-    observations = batch.reset()
-    for _ in range(ACTIONS):
-        observations = batch.step(learner.act(observations[:, None], explore=False)[:, 0])
+    for _ in episode(batch, _greedy(learner)):
+        pass
     return batch.distance()
 
 
 def _perform(group: Group, learner: Learner) -> tuple[np.ndarray, np.ndarray]:
     """An episode without noise: frames (R, 50, H, W, 3), and the final distances (R,) in metres."""
     batch = PusherBatch(group.contexts, group.params.sim.control, group.params.sim.image_size)
-    observations = batch.reset()
-    frames = [batch.render()]
-    for _ in range(ACTIONS):
-        observations = batch.step(learner.act(observations[:, None], explore=False)[:, 0])
-        frames.append(batch.render())
-    return np.stack(frames, axis=1), batch.distance()
+    return film(batch, _greedy(learner)), batch.distance()
+
+
+def _greedy(learner: Learner) -> Act:
+    """The learner's actions without noise, one copy of each run's context."""
+    return lambda now: learner.act(now.observations[:, None], explore=False)[:, 0]
 
 
 def _returns(scoring: Scoring, clips: np.ndarray) -> np.ndarray:
     """Returns (R,) of clips (R, 50, H, W, 3), in the equations' units."""
     steps = [scoring.reward.step(np.ascontiguousarray(clips[:, None, t]), t)[:, 0] for t in range(1, FRAMES)]
-    return np.sum(steps, axis=0) * scoring.units
+    return np.sum(steps, axis=0) * scoring.scales
 
 
 def _film(params: Params, contexts: Sequence[Context], positions: np.ndarray) -> np.ndarray:

@@ -57,7 +57,8 @@ def read_candidates(source: Path) -> list[Candidate]:
     path = source / "manifest.csv"
     if not source.is_dir():
         raise AnyviewError(
-            f"{source}: no such folder; `anyview record` fills data/real/raw, `dvc repro film` the surrogate"
+            f"{source}: no such folder; `anyview record` fills data/raw/recorded, `dvc repro film` "
+            "data/raw/surrogate"
         )
     if not path.exists():
         proposal = propose_manifest(source)

@@ -9,7 +9,7 @@ from scipy.ndimage import median_filter
 
 from anyview.ingest.normalize import SHORTEST_STRETCH, Refused, Stretch, sidecar_times, timed_frames
 from anyview.runtime.errors import AnyviewError
-from anyview.runtime.workers import run_units
+from anyview.runtime.workers import run_tasks
 from anyview.video.manifests import STRETCH_COLUMNS
 from anyview.video.reading import open_video
 
@@ -92,8 +92,8 @@ def propose_stretches(folder: Path, manifest: pd.DataFrame) -> tuple[pd.DataFram
     columns = [column for column in manifest.columns if column not in STRETCH_COLUMNS]
     table = manifest.reindex(columns=[*columns, *STRETCH_COLUMNS], fill_value="")
     empty = table[(table["start"] == "") & (table["end"] == "")]
-    units = [(folder / file,) for file in empty["file"]]
-    motions = dict(zip(empty["file"], run_units(_motion_or_reason, units), strict=True))
+    tasks = [(folder / file,) for file in empty["file"]]
+    motions = dict(zip(empty["file"], run_tasks(_motion_or_reason, tasks), strict=True))
     reasons = {file: found for file, found in motions.items() if isinstance(found, str)}
     readable = empty[~empty["file"].isin(reasons)]
     demonstration = readable["pair"].where(readable["pair"] != "", readable["file"])

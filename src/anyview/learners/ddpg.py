@@ -7,14 +7,15 @@ What is particular here follows from the task, which repeats one episode of fixe
 under a dense reward:
 
 - time is in the observation and the last step is terminal, so that nothing is bootstrapped beyond it;
-- the networks also see time as a row of overlapping bumps, so that a correction at one step leaves others be;
+- the networks also see radial basis functions of time, so that a correction at one step leaves others be;
 - the policy's loss penalises the squares of what enters its tanh (Andrychowicz et al. 2017, appendix A): a
   saturated action has no gradient, and early, wrong critics drive actions there for good;
 - all updates of an iteration follow its episodes, and half of each batch comes from the newest episodes: the
   critic must be sharp where the policy now goes, not where it once went.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -23,10 +24,79 @@ from torch import Tensor
 from anyview import config
 from anyview.learners.common.interfaces import Arrays
 from anyview.learners.common.noise import ornstein_uhlenbeck
-from anyview.learners.common.policies import with_time_bumps
+from anyview.learners.common.policies import with_time_features
 from anyview.learners.common.replay import Replay
 from anyview.learners.common.stacked import Adam, StackedMLP
+from anyview.pusher.batch import ACTION_SIZE, ACTIONS, OBSERVATION_SIZE
+from anyview.runtime.device import torch_device
 from anyview.seeds import stream
+
+Network = Callable[[Tensor], Tensor]
+
+
+class Transitions(NamedTuple):
+    """Transitions (..., width of each field), with what follows n steps later."""
+
+    observations: Tensor
+    actions: Tensor
+    returns: Tensor
+    """Discounted sum of the rewards until then (..., 1)."""
+    next_observations: Tensor
+    """Observations then."""
+    bootstrap_discounts: Tensor
+    """Weight of the value then, 0 at the end of the episode (..., 1)."""
+
+
+def n_step_transitions(
+    observations: Tensor,
+    actions: Tensor,
+    rewards: Tensor,
+    next_observations: Tensor,
+    discount: float,
+    n: int,
+) -> Transitions:
+    """Transitions (T, ..., width) of episodes of T steps: (T, ..., O), (T, ..., A), (T, ...), (T, ..., O).
+
+    The return at step t sums discount^k r_(t+k) over n steps or to the end of the episode, which has nothing
+    after it.
+    """
+    horizon = len(rewards)
+    returns = torch.zeros_like(rewards)
+    for k in range(min(n, horizon)):
+        returns[: horizon - k] += discount**k * rewards[k:]
+    ends = torch.arange(horizon, device=rewards.device).add(n).clamp(max=horizon)  # steps taken by then
+    weights = torch.where(ends < horizon, discount**n, 0.0).view(-1, *[1] * rewards.ndim)
+    bootstrap_discounts = weights.expand(*rewards.shape, 1)
+    return Transitions(
+        observations, actions, returns[..., None], next_observations[ends - 1], bootstrap_discounts
+    )
+
+
+def minibatch_ages(
+    rng: np.random.Generator, updates: int, batch_size: int, newest: int, size: int
+) -> np.ndarray:
+    """Ages (updates, batch_size) of transitions: half of each batch below ``newest``, half below ``size``."""
+    half = batch_size // 2
+    late = rng.integers(newest, size=(updates, half))
+    return np.hstack([late, rng.integers(size, size=(updates, batch_size - half))])
+
+
+def critic_targets(policy: Network, critic: Network, batch: Transitions, inputs: Tensor) -> Tensor:
+    """Returns plus the discounted value (R, B, 1) by the target networks; ``inputs`` are the next ones."""
+    actions = torch.tanh(policy(inputs))
+    return batch.returns + batch.bootstrap_discounts * critic(torch.cat([inputs, actions], dim=-1))
+
+
+def critic_loss(critic: Network, inputs: Tensor, actions: Tensor, targets: Tensor) -> Tensor:
+    """Mean squared error of the critic's values (R, 1)."""
+    return ((critic(torch.cat([inputs, actions], dim=-1)) - targets) ** 2).mean(1)
+
+
+def policy_loss(policy: Network, critic: Network, inputs: Tensor, penalty: float) -> Tensor:
+    """``penalty`` times the squares of what enters tanh, minus the value of the actions: means (R, 1)."""
+    before_tanh = policy(inputs)
+    chosen = torch.cat([inputs, torch.tanh(before_tanh)], dim=-1)
+    return (penalty * (before_tanh**2).sum(-1, keepdim=True) - critic(chosen)).mean(1)
 
 
 class DDPG:
@@ -57,8 +127,7 @@ class DDPG:
         self._critic = StackedMLP.initial([inputs + action_size, *params.hidden, 1], weights, device)
         self._target_policy, self._target_critic = self._policy.copy(), self._critic.copy()
         self._policy_adam, self._critic_adam = Adam(self._policy), Adam(self._critic)
-        # A row of the replay: observation, action, n-step return, observation n steps on, and its discount.
-        self._widths = [observation_size, action_size, 1, observation_size, 1]
+        self._widths = [observation_size, action_size, 1, observation_size, 1]  # of ``Transitions``
         self._replay = Replay(len(self._runs), params.replay, sum(self._widths), device)
         self._iteration = 0
         self._begin()
@@ -77,7 +146,7 @@ class DDPG:
         return torch.from_numpy(np.asarray(array, np.float32)).to(self._device)
 
     def _input(self, observations: Tensor) -> Tensor:
-        return with_time_bumps(observations, self._params.time_bumps)
+        return with_time_features(observations, self._params.time_bumps)
 
     @torch.no_grad()
     def act(self, observations: np.ndarray, explore: bool) -> np.ndarray:
@@ -104,58 +173,43 @@ class DDPG:
     def end_iteration(self) -> None:
         """Store the episodes; then take the iteration's updates."""
         params = self._params
-        self._replay.add(self._transitions())
-        self._iteration += 1
-        if self._iteration * self._copies >= params.warmup_episodes:
-            updates = round(params.updates_per_step * self._horizon * self._copies)
-            for ages in self._sample(updates):
-                self._update(self._replay.take(ages))
-        self._begin()
-
-    def _transitions(self) -> Tensor:
-        """The episodes as rows of the replay (R, C T, W), one episode after the other.
-
-        The return at step t sums discount^k r_(t+k) over n steps or to the end of the episode, which has
-        nothing after it.
-        """
-        n, discount, horizon = self._params.n_step, self._params.discount, self._horizon
-        observations, actions, rewards, following = (
+        observations, actions, rewards, next_observations = (
             torch.stack(each) for each in zip(*self._episode, strict=True)
         )
-        returns = torch.zeros_like(rewards)
-        ends = torch.arange(horizon, device=self._device).add(n).clamp(max=horizon)  # steps taken by then
-        for k in range(n):
-            returns[: horizon - k] += discount**k * rewards[k:]
-        beyond = torch.where(ends < horizon, discount**n, 0.0)[:, None, None, None].expand(*rewards.shape, 1)
-        rows = torch.cat([observations, actions, returns[..., None], following[ends - 1], beyond], dim=-1)
-        return rows.permute(1, 2, 0, 3).flatten(1, 2)
+        transitions = n_step_transitions(
+            observations, actions, rewards, next_observations, params.discount, params.n_step
+        )
+        rows = torch.cat(transitions, dim=-1).permute(1, 2, 0, 3)  # one episode after the other
+        self._replay.add(rows.flatten(1, 2))
+        self._iteration += 1
+        if self._iteration * self._copies >= params.warmup_episodes:
+            for ages in self._minibatches():
+                self._update(Transitions(*self._replay.take(ages).split(self._widths, dim=-1)))
+        self._begin()
 
-    def _sample(self, updates: int) -> Tensor:
-        """Ages (updates, R, B) of transitions: half of a batch from the newest episodes, half from all."""
+    def _minibatches(self) -> Tensor:
+        """The ages (updates, R, B) of the iteration's batches."""
         params, size = self._params, self._replay.size
+        updates = round(params.updates_per_step * self._horizon * self._copies)
         newest = min(size, params.recent_episodes * self._horizon)
-        half = params.batch_size // 2
-        drawn = []
-        for run in self._runs:
-            rng = stream(self._seed, "replay", run, self._iteration)
-            late = rng.integers(newest, size=(updates, half))
-            drawn.append(np.hstack([late, rng.integers(size, size=(updates, params.batch_size - half))]))
+        drawn = [
+            minibatch_ages(
+                stream(self._seed, "replay", run, self._iteration), updates, params.batch_size, newest, size
+            )
+            for run in self._runs
+        ]
         return torch.from_numpy(np.stack(drawn, axis=1)).to(self._device)
 
-    def _update(self, batch: Tensor) -> None:
-        """One step of critic and policy on ``batch`` (R, B, W). Losses are means over B, sums over runs."""
+    def _update(self, batch: Transitions) -> None:
+        """One step of critic, policy and targets on ``batch`` (R, B, width). Losses are summed over runs."""
         params = self._params
-        observations, actions, returns, following, beyond = batch.split(self._widths, dim=-1)
-        inputs, following = self._input(observations), self._input(following)
+        inputs, next_inputs = self._input(batch.observations), self._input(batch.next_observations)
         with torch.no_grad():
-            next_actions = torch.tanh(self._target_policy(following))
-            targets = returns + beyond * self._target_critic(torch.cat([following, next_actions], dim=-1))
-        values = self._critic(torch.cat([inputs, actions], dim=-1))
-        self._critic_adam.descend(((values - targets) ** 2).mean(1).sum(), params.critic_learning_rate)
-        before_tanh = self._policy(inputs)
-        chosen = torch.cat([inputs, torch.tanh(before_tanh)], dim=-1)
-        cost = params.preactivation_penalty * (before_tanh**2).sum(-1, keepdim=True) - self._critic(chosen)
-        self._policy_adam.descend(cost.mean(1).sum(), params.policy_learning_rate)
+            targets = critic_targets(self._target_policy, self._target_critic, batch, next_inputs)
+        loss = critic_loss(self._critic, inputs, batch.actions, targets)
+        self._critic_adam.descend(loss.sum(), params.critic_learning_rate)
+        loss = policy_loss(self._policy, self._critic, inputs, params.preactivation_penalty)
+        self._policy_adam.descend(loss.sum(), params.policy_learning_rate)
         self._target_critic.flat.lerp_(self._critic.flat, params.target_rate)
         self._target_policy.flat.lerp_(self._policy.flat, params.target_rate)
 
@@ -192,3 +246,19 @@ class DDPG:
             "critic_mean": self._critic_adam.mean,
             "critic_square": self._critic_adam.square,
         }
+
+
+def make_learner(params: config.Params, runs: Sequence[int]) -> DDPG:
+    """Untrained learners for ``runs`` of the pusher."""
+    imitation = params.imitation
+    return DDPG(
+        imitation.ddpg,
+        params.base.seed,
+        runs,
+        OBSERVATION_SIZE,
+        ACTION_SIZE,
+        horizon=ACTIONS,
+        copies=imitation.episodes_per_iteration,
+        iterations=imitation.iterations,
+        device=torch_device(),
+    )

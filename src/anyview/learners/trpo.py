@@ -14,6 +14,7 @@ from torch import Tensor
 
 from anyview import config
 from anyview.learners.common.interfaces import Arrays
+from anyview.pusher.batch import ACTION_SIZE, ACTIONS, OBSERVATION_SIZE
 from anyview.seeds import stream
 
 _LINE_SEARCH_STEPS = 12
@@ -313,3 +314,8 @@ def policy_step(
             if not searching.any():
                 break
     return result
+
+
+def make_learner(params: config.Params, runs: Sequence[int]) -> TRPO:
+    """Untrained learners for ``runs`` of the pusher."""
+    return TRPO(params.imitation.trpo, params.base.seed, runs, OBSERVATION_SIZE, ACTION_SIZE, ACTIONS)

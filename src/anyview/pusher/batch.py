@@ -1,6 +1,7 @@
 """N pushers side by side on ``mujoco.batch``: physics, observations and frames of many contexts at once."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import mujoco
 import mujoco.batch
@@ -20,6 +21,7 @@ from anyview.pusher.scene import (
     SUBSTEPS,
     model,
 )
+from anyview.trigonometry import unit_vector
 
 ACTION_SIZE = 3
 OBSERVATION_SIZE = 15
@@ -36,6 +38,7 @@ __all__ = [
     "OBSERVATION_SIZE",
     "TOLERANCE",
     "PusherBatch",
+    "finite_actions",
 ]
 
 
@@ -53,6 +56,11 @@ class PusherBatch:
         self._batch = mujoco.batch.Batch(model(control), nsim=self.count, nthread=1)
         self._qpos, self._qvel, self._ctrl = (self._batch.bind(name) for name in ("qpos", "qvel", "ctrl"))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # MuJoCo's batch can be neither copied nor pickled. All that its next step depends on is one array.
+        state = self._batch.state.copy()
+        return _continued, (self.contexts, self._control, self._image_size, self.steps, state)
+
     def reset(self) -> np.ndarray:
         """Put every pusher at its context's start; observations (N, OBSERVATION_SIZE)."""
         self._batch.reset()
@@ -62,8 +70,11 @@ class PusherBatch:
         return self.observations()
 
     def step(self, actions: np.ndarray) -> np.ndarray:
-        """Act for 0.1 s with ``actions`` (N, 3) in [-1, 1]; observations (N, OBSERVATION_SIZE) float32."""
-        actions = np.clip(np.asarray(actions, np.float64), -1, 1)
+        """Act for 0.1 s with ``actions`` (N, 3) in [-1, 1]; observations (N, OBSERVATION_SIZE) float32.
+
+        Raises ValueError if an action is not finite, or their shape is another.
+        """
+        actions = finite_actions(actions, (self.count, ACTION_SIZE)).clip(-1, 1)
         if self._control == "torque":
             self._ctrl[:] = actions * MAX_TORQUE
         else:
@@ -91,8 +102,7 @@ class PusherBatch:
             joints / JOINT_RANGE,
             self._qvel[:, :3] / MAX_JOINT_SPEED,
             _in_arena(tool[:, :2]),
-            np.sin(tool[:, 2:]),
-            np.cos(tool[:, 2:]),
+            unit_vector(tool[:, 2])[:, ::-1],
             _in_arena(self._qpos[:, 3:]),
             _in_arena(self._goal),
             np.full((self.count, 1), 2 * self.steps / ACTIONS - 1),
@@ -110,6 +120,32 @@ class PusherBatch:
     def render(self) -> np.ndarray:
         """What each context's camera sees: (N, H, W, 3) uint8 RGB."""
         return renderer(self._image_size).render(self.contexts, self._qpos)
+
+
+def _continued(
+    contexts: list[Context], control: str, image_size: int, steps: int, state: np.ndarray
+) -> PusherBatch:
+    """A batch whose episode goes on after ``steps`` steps from MuJoCo's ``state`` (N, its size)."""
+    pushers = PusherBatch(contexts, control, image_size)
+    pushers.steps = steps
+    pushers._batch.state[:] = state
+    return pushers
+
+
+def finite_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """``actions`` as float64; raises ValueError if they are not finite numbers of ``shape``.
+
+    MuJoCo would answer an infinite or undefined control by resetting that simulation, and write a log file.
+    """
+    try:
+        numbers = np.asarray(actions, np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"action: expected numbers of shape {shape}, got {actions!r}") from None
+    if numbers.shape != shape:
+        raise ValueError(f"action: expected the shape {shape}, got {numbers.shape}")
+    if not np.isfinite(numbers).all():
+        raise ValueError(f"action: expected finite numbers, got {numbers.tolist()}")
+    return numbers
 
 
 def _in_arena(position: np.ndarray) -> np.ndarray:

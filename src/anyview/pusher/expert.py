@@ -8,8 +8,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from anyview.pusher.batch import ACTIONS, FRAMES, MAX_TWIST, PusherBatch
+from anyview.pusher.batch import MAX_TWIST, PusherBatch
 from anyview.pusher.contexts import Context
+from anyview.pusher.episodes import Moment, episode
 from anyview.pusher.kinematics import tool_pose, wrap
 from anyview.pusher.path import expert_poses
 from anyview.pusher.scene import CONTROL_SECONDS
@@ -18,19 +19,20 @@ from anyview.pusher.scene import CONTROL_SECONDS
 def roll_out(contexts: Sequence[Context]) -> tuple[np.ndarray, np.ndarray]:
     """Run the expert in every context.
 
-    Returns positions (N, 50, 5) as ``Renderer`` takes them and final distances (N,) in metres.
+    Returns positions (N, 50, 5) as ``Renderer`` takes them and final distances (N,) in metres, rounded to 6
+    decimals.
     """
     batch = PusherBatch(contexts)
     batch.reset()
     start = batch.positions()
     goal = np.array([c.goal_xy for c in contexts])
     reference = expert_poses(start[:, :3], start[:, 3:], goal)
-    positions = np.empty((len(contexts), FRAMES, start.shape[1]))
-    positions[:, 0] = start
-    for t in range(ACTIONS):
+
+    def act(now: Moment) -> np.ndarray:
         # Aim at where the path will be after this action: feed-forward and feedback in one.
-        error = reference[:, t + 1] - tool_pose(batch.positions()[:, :3])
+        error = reference[:, now.step + 1] - tool_pose(batch.positions()[:, :3])
         error[:, 2] = wrap(error[:, 2])
-        batch.step(error / CONTROL_SECONDS / MAX_TWIST)
-        positions[:, t + 1] = batch.positions()
-    return positions, batch.distance()
+        return error / CONTROL_SECONDS / MAX_TWIST
+
+    positions = np.stack([batch.positions() for _ in episode(batch, act)], axis=1)
+    return positions, batch.distance().round(6)

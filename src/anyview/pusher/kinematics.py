@@ -1,11 +1,16 @@
 """The planar arm's geometry: tool pose from joints, joints from tool pose, Jacobian. All arrays are batched.
 
 A tool pose is (x, y, heading) in metres and radians: the end of the third link and the way the cup points.
+
+Physics and demonstrations rest on this module, and its results have the same bits on every processor. So
+nothing here calls BLAS or LAPACK (``@``, ``np.dot``, ``np.linalg.solve``, the norm of a single vector): they
+sum in another order on another processor.
 """
 
 import numpy as np
 
 from anyview.pusher.scene import ARENA_CENTRE, JOINT_RANGE, LINK, WORKSPACE_RADIUS
+from anyview.trigonometry import angle_of, unit_vector
 
 
 def wrap(angle: np.ndarray) -> np.ndarray:
@@ -13,24 +18,18 @@ def wrap(angle: np.ndarray) -> np.ndarray:
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
-def heading(angle: np.ndarray) -> np.ndarray:
-    """Unit vectors (..., 2) that point along ``angle`` (...)."""
-    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-
-
 def tool_pose(joints: np.ndarray) -> np.ndarray:
     """Tool poses (..., 3) for joint angles (..., 3)."""
     angles = np.cumsum(joints, axis=-1)
-    position = LINK * heading(angles).sum(axis=-2)
+    position = LINK * unit_vector(angles).sum(axis=-2)
     return np.concatenate([position, angles[..., 2:]], axis=-1)
 
 
 def jacobian(joints: np.ndarray) -> np.ndarray:
-    """d(tool pose)/d(joints), (..., 3, 3)."""
-    angles = np.cumsum(joints, axis=-1)
-    links = LINK * np.stack([-np.sin(angles), np.cos(angles)], axis=-2)  # (..., 2, link)
-    linear = np.cumsum(links[..., ::-1], axis=-1)[..., ::-1]  # joint k moves the links from k outward
-    return np.concatenate([linear, np.ones_like(linear[..., :1, :])], axis=-2)
+    """d(tool position)/d(joints), (..., 2, 3). The third row, of the heading, is all ones and left out."""
+    links = LINK * unit_vector(np.cumsum(joints, axis=-1))  # (..., link, 2)
+    outward = np.cumsum(links[..., ::-1, :], axis=-2)[..., ::-1, :]  # joint k moves the links from k outward
+    return np.stack([-outward[..., 1], outward[..., 0]], axis=-2)
 
 
 def within_workspace(position: np.ndarray) -> np.ndarray:
@@ -49,10 +48,20 @@ def joint_velocity(joints: np.ndarray, twist: np.ndarray, damping: float = 0.03)
 
     q' = J^T (J J^T + damping^2 I)^-1 twist stays bounded where the arm is stretched.
     """
-    matrix = jacobian(joints)
-    transposed = np.swapaxes(matrix, -1, -2)
-    normal = matrix @ transposed + damping**2 * np.eye(3)
-    return (transposed @ np.linalg.solve(normal, twist[..., None]))[..., 0]
+    x, y = np.moveaxis(jacobian(joints), -2, 0)
+    vx, vy, turn = twist[..., 0], twist[..., 1], twist[..., 2]
+    sum_x, sum_y = x.sum(-1), y.sum(-1)
+    # J J^T + damping^2 I is 3x3: eliminate the third row, then Cramer's rule for the first two.
+    corner = 3 + damping**2
+    xx = (x * x).sum(-1) + damping**2 - sum_x * sum_x / corner
+    xy = (x * y).sum(-1) - sum_x * sum_y / corner
+    yy = (y * y).sum(-1) + damping**2 - sum_y * sum_y / corner
+    right_x, right_y = vx - sum_x * turn / corner, vy - sum_y * turn / corner
+    determinant = xx * yy - xy * xy
+    pull_x = (yy * right_x - xy * right_y) / determinant
+    pull_y = (xx * right_y - xy * right_x) / determinant
+    pull_turn = (turn - sum_x * pull_x - sum_y * pull_y) / corner
+    return x * pull_x[..., None] + y * pull_y[..., None] + pull_turn[..., None]
 
 
 def joints_for(pose: np.ndarray, elbow: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -60,10 +69,11 @@ def joints_for(pose: np.ndarray, elbow: np.ndarray) -> tuple[np.ndarray, np.ndar
 
     Reachable means within JOINT_RANGE and with the wrist clear of full stretch.
     """
-    wrist = pose[..., :2] - LINK * heading(pose[..., 2])
-    cosine = (wrist**2).sum(-1) / (2 * LINK**2) - 1
-    bend = elbow * np.arccos(np.clip(cosine, -1, 1))
-    shoulder = np.arctan2(wrist[..., 1], wrist[..., 0]) - bend / 2  # equal links: the triangle is isosceles
+    wrist = pose[..., :2] - LINK * unit_vector(pose[..., 2])
+    cosine = np.clip((wrist**2).sum(-1) / (2 * LINK**2) - 1, -1, 1)
+    bend = elbow * angle_of(cosine, np.sqrt(1 - cosine**2))
+    # Equal links: the triangle is isosceles.
+    shoulder = angle_of(wrist[..., 0], wrist[..., 1]) - bend / 2
     joints = wrap(np.stack([shoulder, bend, pose[..., 2] - shoulder - bend], axis=-1))
     reachable = (np.abs(joints) < JOINT_RANGE - 0.05).all(-1) & (np.abs(bend) > 0.4)
     return joints, reachable

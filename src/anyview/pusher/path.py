@@ -5,8 +5,9 @@ Clips are paired by time step, so that frame t means the same progress in each o
 
 import numpy as np
 
-from anyview.pusher.kinematics import heading, tool_pose, wrap
+from anyview.pusher.kinematics import tool_pose, wrap
 from anyview.pusher.scene import CUP, FINGER_RADIUS, OBJECT_RADIUS, SEAT
+from anyview.trigonometry import angle_of, unit_vector
 
 FRAMES = 50  # of an episode: o_0 after reset, then o_t after action t
 ACTIONS = FRAMES - 1
@@ -19,15 +20,15 @@ APPROACH_CLEARANCE = 0.02  # metres between cup and object during the approach
 def push_pose(object_xy: np.ndarray, goal_xy: np.ndarray) -> np.ndarray:
     """Tool poses (..., 3) that stand behind the object, facing the goal."""
     way = goal_xy - object_xy
-    direction = np.arctan2(way[..., 1], way[..., 0])
-    position = object_xy - (SEAT + STANDOFF) * heading(direction)
+    direction = angle_of(way[..., 0], way[..., 1])
+    position = object_xy - (SEAT + STANDOFF) * unit_vector(direction)
     return np.concatenate([position, direction[..., None]], axis=-1)
 
 
 def minimum_jerk(progress: np.ndarray) -> np.ndarray:
     """Smooth 0 to 1 with zero speed and acceleration at both ends (Flash and Hogan 1985)."""
     s = np.clip(progress, 0, 1)
-    return s**3 * (10 - 15 * s + 6 * s**2)
+    return s * s * s * (10 - 15 * s + 6 * s * s)
 
 
 def expert_poses(arm_qpos: np.ndarray, object_xy: np.ndarray, goal_xy: np.ndarray) -> np.ndarray:
@@ -35,7 +36,7 @@ def expert_poses(arm_qpos: np.ndarray, object_xy: np.ndarray, goal_xy: np.ndarra
     start = tool_pose(arm_qpos)
     behind = push_pose(object_xy, goal_xy)
     end = behind.copy()
-    end[:, :2] = goal_xy - SEAT * heading(behind[:, 2])
+    end[:, :2] = goal_xy - SEAT * unit_vector(behind[:, 2])
     turn = behind - start
     turn[:, 2] = wrap(turn[:, 2])
     steps = np.arange(FRAMES)
@@ -47,12 +48,13 @@ def expert_poses(arm_qpos: np.ndarray, object_xy: np.ndarray, goal_xy: np.ndarra
 def clearance(poses: np.ndarray, object_xy: np.ndarray) -> np.ndarray:
     """Least distance (P,) in metres between cup and object during the approach of ``poses`` (P, T, 3)."""
     approach = poses[:, : APPROACH_END + 1]
-    forward = heading(approach[..., 2])
+    forward = unit_vector(approach[..., 2])
     left = np.stack([-forward[..., 1], forward[..., 0]], axis=-1)
     relative = object_xy[:, None] - approach[..., :2]
     seen = np.stack([(relative * forward).sum(-1), (relative * left).sum(-1)], axis=-1)  # in the tool's frame
     distance = np.full(seen.shape[:2], np.inf)
     for a, b in CUP:
-        along = np.clip(((seen - a) @ (b - a)) / ((b - a) @ (b - a)), 0, 1)
-        distance = np.minimum(distance, np.linalg.norm(seen - a - along[..., None] * (b - a), axis=-1))
+        part = b - a
+        along = np.clip(((seen - a) * part).sum(-1) / (part * part).sum(), 0, 1)
+        distance = np.minimum(distance, np.linalg.norm(seen - a - along[..., None] * part, axis=-1))
     return distance.min(-1) - FINGER_RADIUS - OBJECT_RADIUS

@@ -6,8 +6,8 @@ place. A frame is rendered at twice its size and averaged, so that a shift of a 
 """
 
 import copy
+import threading
 from collections.abc import Sequence
-from functools import cache
 
 import cv2
 import mujoco
@@ -21,7 +21,7 @@ _OFF = ("mjRND_SHADOW", "mjRND_REFLECTION", "mjRND_SKYBOX", "mjRND_HAZE", "mjRND
 
 
 class Renderer:
-    """Renders square frames of one size. Use ``renderer(image_size)``, which shares one a process."""
+    """Renders square frames of one size. Use ``renderer(image_size)``, which shares one a thread."""
 
     def __init__(self, image_size: int):
         self._size = image_size
@@ -88,7 +88,18 @@ class Renderer:
         cv2.resize(self._pixels[::-1], (self._size, self._size), dst=frame, interpolation=cv2.INTER_AREA)
 
 
-@cache
+class _Renderers(threading.local):
+    """Each thread's renderers: an OpenGL context belongs to the thread that made it."""
+
+    def __init__(self) -> None:
+        self.by_size: dict[int, Renderer] = {}
+
+
+_renderers = _Renderers()
+
+
 def renderer(image_size: int) -> Renderer:
-    """The process's renderer for ``image_size``."""
-    return Renderer(image_size)
+    """This thread's renderer for ``image_size``."""
+    if image_size not in _renderers.by_size:
+        _renderers.by_size[image_size] = Renderer(image_size)
+    return _renderers.by_size[image_size]

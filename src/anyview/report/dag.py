@@ -1,6 +1,10 @@
-"""The pipeline as a picture, drawn from ``dvc.yaml``: one box a stage, implied edges left out."""
+"""The pipeline as a picture, drawn from ``dvc.yaml``: one box a stage, implied edges left out.
 
-import html
+``dvc dag --collapse-foreach-matrix --mermaid`` names stages and edges too, also while a stage runs. But a
+browser draws that with megabytes of script only, and the page is one small file that opens offline; it has
+neither the cells nor the descriptions; and it needs a DVC repository around the results.
+"""
+
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -8,12 +12,14 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import Any
 
+from jinja2 import Environment
+
 from anyview.runtime.errors import AnyviewError
 
 Edges = dict[str, set[str]]
+Stop = str | tuple[str, str]
 
 _REFERENCE = re.compile(r"\$\{([\w.-]+)\}")
-_BOX_WIDTH, _BOX_HEIGHT, _GAP_X, _GAP_Y, _MARGIN = 168, 54, 36, 40, 8
 
 
 @dataclass(frozen=True)
@@ -98,53 +104,48 @@ def _sorted(followers: Edges) -> list[str]:
         raise AnyviewError("dvc.yaml: its stages depend on each other in a circle") from None
 
 
-def draw(stages: list[Stage]) -> str:
-    """The stages that make something as an SVG element, top to bottom; the page's style sheet colours it."""
-    stages = [stage for stage in stages if stage.outputs]
-    edges = needed_edges(stages)
-    # A stage stands right above its first follower: then few arrows pass behind another box.
+def layers(edges: Edges) -> list[list[Stop]]:
+    """What stands beside each other, top to bottom: stages, and the edges that pass between them.
+
+    Each stage stands right above its first follower.
+    """
     above_end: dict[str, int] = {}
     for name in _sorted(edges):
         above_end[name] = 1 + max((above_end[follower] for follower in edges[name]), default=-1)
-    levels = range(max(above_end.values()), -1, -1)
-    layers = [[stage.name for stage in stages if above_end[stage.name] == level] for level in levels]
-    widest = max(len(layer) for layer in layers)
-    width = widest * _BOX_WIDTH + (widest - 1) * _GAP_X + 2 * _MARGIN
-    height = len(layers) * _BOX_HEIGHT + (len(layers) - 1) * _GAP_Y + 2 * _MARGIN
-    places = {}
-    for level, layer in enumerate(layers):
-        row = len(layer) * _BOX_WIDTH + (len(layer) - 1) * _GAP_X
-        for index, name in enumerate(layer):
-            x = (width - row) / 2 + index * (_BOX_WIDTH + _GAP_X)
-            places[name] = (x, _MARGIN + level * (_BOX_HEIGHT + _GAP_Y))
-    arrows = [(maker.name, user) for maker in stages for user in sorted(edges[maker.name])]
-    label = "The pipeline's stages: " + "; ".join(f"{maker} feeds {user}" for maker, user in arrows)
-    return (
-        f'<svg class="dag" viewBox="0 0 {width} {height}" role="img" aria-label="{html.escape(label)}" '
-        f'style="max-width:{width}px">'
-        '<defs><marker id="tip" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="8" markerHeight="8" '
-        'orient="auto"><path d="M0 0 8 4 0 8z"/></marker></defs>'
-        + "".join(_arrow(places[maker], places[user]) for maker, user in arrows)
-        + "".join(_box(stage, *places[stage.name]) for stage in stages)
-        + "</svg>"
-    )
+    arrows = [(maker, user) for maker in edges for user in sorted(edges[maker])]
+    order = {name: index for index, name in enumerate(edges)}
+    rows: list[list[Stop]] = []
+    for level in range(max(above_end.values(), default=-1), -1, -1):
+        stages = [name for name in edges if above_end[name] == level]
+        passing = [(maker, user) for maker, user in arrows if above_end[user] < level < above_end[maker]]
+        rows.append(
+            sorted([*stages, *passing], key=lambda stop: order[stop if isinstance(stop, str) else stop[1]])
+        )
+    return rows
 
 
-def _arrow(start: tuple[float, float], end: tuple[float, float]) -> str:
-    x0, y0 = start[0] + _BOX_WIDTH / 2, start[1] + _BOX_HEIGHT
-    x1, y1 = end[0] + _BOX_WIDTH / 2, end[1] - 1
-    bend = (y1 - y0) / 2
-    path = f"M{x0:g} {y0:g}C{x0:g} {y0 + bend:g} {x1:g} {y1 - bend:g} {x1:g} {y1:g}"
-    return f'<path class="edge" marker-end="url(#tip)" d="{path}"/>'
-
-
-def _box(stage: Stage, x: float, y: float) -> str:
-    middle = x + _BOX_WIDTH / 2
-    count = f"{len(stage.cells)} cells" if stage.cells else "one run"
-    title = ": ".join(filter(None, (stage.name, stage.about, ", ".join(stage.cells))))
-    return (
-        f"<g><title>{html.escape(title)}</title>"
-        f'<rect x="{x:g}" y="{y:g}" width="{_BOX_WIDTH}" height="{_BOX_HEIGHT}" rx="8"/>'
-        f'<text class="stage" x="{middle:g}" y="{y + 23:g}">{html.escape(stage.name)}</text>'
-        f'<text class="count" x="{middle:g}" y="{y + 42:g}">{count}</text></g>'
+def draw(stages: list[Stage], templates: Environment) -> str:
+    """The stages that make something as an SVG element; the page's style sheet colours it."""
+    shown = {stage.name: stage for stage in stages if stage.outputs}
+    edges = needed_edges(list(shown.values()))
+    rows = layers(edges)
+    boxes: dict[str, tuple[float, int]] = {}
+    arrows: dict[tuple[str, str], list[tuple[float, int]]] = {}
+    for level, row in enumerate(rows):
+        for index, stop in enumerate(row):
+            place = (index - len(row) / 2, level)
+            if isinstance(stop, str):
+                boxes[stop] = place
+            else:
+                arrows.setdefault(stop, []).append(place)
+    return templates.get_template("dag.svg.jinja").render(
+        stages=shown,
+        boxes=boxes,
+        arrows={
+            (maker, user): [boxes[maker], *arrows.get((maker, user), []), boxes[user]]
+            for maker in shown
+            for user in sorted(edges[maker])
+        },
+        columns=max(len(row) for row in rows),
+        rows=len(rows),
     )

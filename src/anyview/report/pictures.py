@@ -1,4 +1,4 @@
-"""Frames as pictures for the page: film strips that play in the browser, and strips of stills."""
+"""Frames as pictures for the page: clips that play in the browser, and strips of stills."""
 
 import base64
 from collections.abc import Sequence
@@ -20,14 +20,14 @@ class Strip:
 
 
 @dataclass(frozen=True)
-class Film:
+class Clip:
     """A clip as one picture, its ``count`` frames one under another, for a player that shows one."""
 
     source: str
     count: int
     width: int
     height: int
-    alt: str
+    caption: str
 
 
 def every(frames: np.ndarray, stride: int) -> tuple[int, ...]:
@@ -43,20 +43,20 @@ def make_strip(rows: Sequence[tuple[str, np.ndarray]], stride: int = 7) -> Strip
     return Strip(tuple((label, frames[list(steps)]) for label, frames in rows), steps)
 
 
-def make_film(frames: np.ndarray, alt: str, stride: int = 2) -> Film:
-    """A film of every ``stride``-th frame of ``frames``, uint8 RGB (T, H, W, 3)."""
+def make_clip(frames: np.ndarray, caption: str, stride: int = 2) -> Clip:
+    """A clip of every ``stride``-th frame of ``frames``, uint8 RGB (T, H, W, 3)."""
     kept = frames[list(every(frames, stride))]
     count, height, width, _ = kept.shape
-    return Film(webp(kept.reshape(count * height, width, 3), lossless=False), count, width, height, alt)
+    return Clip(_webp(kept.reshape(count * height, width, 3), lossless=False), count, width, height, caption)
 
 
-def side_by_side(frames: np.ndarray) -> np.ndarray:
-    """Frames (n, H, W, 3) in one row (H, n (W + 1), 3), each with a white line to its right."""
+def row_uri(frames: np.ndarray) -> str:
+    """Frames (n, H, W, 3) in one row, each with a white line to its right, as a data URI."""
     lined = np.pad(frames, ((0, 0), (0, 0), (0, 1), (0, 0)), constant_values=255)
-    return np.concatenate(list(lined), axis=1)
+    return _webp(np.concatenate(list(lined), axis=1), lossless=True)
 
 
-def webp(picture: np.ndarray, lossless: bool) -> str:
+def _webp(picture: np.ndarray, lossless: bool) -> str:
     """``picture``, uint8 RGB (H, W, 3), as a data URI."""
     options = [cv2.IMWRITE_WEBP_QUALITY, _LOSSLESS if lossless else _QUALITY]
     done, content = cv2.imencode(".webp", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR), options)

@@ -7,90 +7,42 @@ from pathlib import Path
 
 import pandas as pd
 
-from anyview.report import thesis
-from anyview.report.cells import in_order, label
-from anyview.report.comparisons import compare_with_ours
-from anyview.report.estimates import proportion
-from anyview.report.exhibits_translation import clip_strip, typical_clip
+from anyview.analysis.cells import label
+from anyview.analysis.results import Results
+from anyview.analysis.study import Study
 from anyview.report.figures.style import to_png
 from anyview.report.figures.translation import strip
-from anyview.report.inputs import Study
-from anyview.report.overview import idea_strip
+from anyview.report.illustrations import idea_strip, typical_strip
 from anyview.runtime.outputs import write_atomically
 
 _POINTS = 100
 
 
-def write_plots(folder: Path, study: Study) -> None:
+def write_plots(folder: Path, study: Study, results: Results) -> None:
     """Write every table and picture that ``study`` allows into ``folder``."""
-    losses = {
-        cell: training.curve[["iteration", "validation_loss"]] for cell, training in study.trainings.items()
-    }
-    distances = {cell: _quartiles(study.evaluations[cell].curve) for cell in in_order(study.evaluations)}
-    weights = {
-        cell: pd.Series(entry.feature_weights, name="weight").rename_axis("frame").reset_index()
-        for cell, entry in study.translations.items()
-    }
-    _write(folder / "validation_loss.csv", _curves(losses))
-    _write(folder / "final_distance.csv", _curves(distances))
-    _write(folder / "feature_weights.csv", _curves(weights))
-    _write(folder / "success.csv", _success(study))
-    _write(folder / "differences.csv", _differences(study))
-    for cell, translation in study.translations.items():
-        clip = typical_clip(translation, "validation")
-        picture = strip(clip_strip(translation, clip), f"{cell}: {clip}")
+    _write(folder / "validation_loss.csv", _thin(results.losses[["cell", "iteration", "validation_loss"]]))
+    _write(folder / "final_distance.csv", _thin(results.learning))
+    _write(folder / "feature_weights.csv", _thin(results.feature_weights))
+    rates = results.imitation[results.imitation["metric"] == "success_rate"]
+    success = rates.assign(method=rates["cell"].map(label)).rename(columns={"value": "success_rate"})
+    _write(folder / "success.csv", success[["method", "success_rate", "low", "high", "thesis"]])
+    table = results.differences
+    differences = table.assign(method=table["cell"].map(label)).rename(
+        columns={"value": "difference", "p": "mcnemar_p"}
+    )
+    _write(folder / "differences.csv", differences[["method", "difference", "low", "high", "mcnemar_p"]])
+    for cell, translator in study.translators.items():
+        picture = strip(typical_strip(translator), f"{cell}: {translator.typical('validation')}")
         write_atomically(folder / "strips" / f"{cell}.png", to_png(picture))
     if (idea := idea_strip(study)) is not None:
         write_atomically(folder / "idea.png", to_png(strip(idea)))
 
 
-def _quartiles(curve: pd.DataFrame) -> pd.DataFrame:
-    """Columns ``iteration``, ``final_distance`` (median over runs), ``low`` and ``high`` (quartiles)."""
-    quartiles = curve.groupby("iteration")["final_distance"].quantile([0.5, 0.25, 0.75]).unstack()
-    return quartiles.set_axis(["final_distance", "low", "high"], axis=1).reset_index()
-
-
-def _curves(curves: dict[str, pd.DataFrame]) -> pd.DataFrame:
-    """``cell`` and the curves' own columns; each curve thinned to at most ``_POINTS`` points and its last."""
-    parts = []
-    for cell, curve in curves.items():
-        kept = sorted({*range(0, len(curve), -(-len(curve) // _POINTS)), len(curve) - 1})
-        thin = curve.iloc[kept].copy()
-        thin.insert(0, "cell", cell)
-        parts.append(thin)
-    return pd.concat(parts) if parts else pd.DataFrame()
-
-
-def _success(study: Study) -> pd.DataFrame:
-    rows = []
-    for cell in in_order(study.evaluations):
-        runs = study.evaluations[cell].runs
-        rate = proportion(int(runs["success"].sum()), len(runs))
-        stated = thesis.SUCCESSES.get(cell)
-        rows.append(
-            {
-                "method": label(cell),
-                "success_rate": rate.value,
-                "low": rate.low,
-                "high": rate.high,
-                "thesis": None if stated is None else stated / thesis.RUNS,
-            }
-        )
-    return pd.DataFrame(rows)
-
-
-def _differences(study: Study) -> pd.DataFrame:
-    rows = [
-        {
-            "method": label(entry.cell),
-            "difference": entry.difference.value,
-            "low": entry.difference.low,
-            "high": entry.difference.high,
-            "mcnemar_p": entry.p,
-        }
-        for entry in compare_with_ours(study.evaluations, study.params.base.seed)
-    ]
-    return pd.DataFrame(rows)
+def _thin(curves: pd.DataFrame) -> pd.DataFrame:
+    """Each cell's curve with at most ``_POINTS`` points and its last."""
+    place = curves.groupby("cell", sort=False).cumcount()
+    length = curves.groupby("cell", sort=False)["cell"].transform("size")
+    return curves[(place % -(-length // _POINTS) == 0) | (place == length - 1)]
 
 
 def _write(path: Path, table: pd.DataFrame) -> None:

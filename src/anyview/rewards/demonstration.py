@@ -11,22 +11,23 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from anyview import config
+from anyview.config import RewardWeights
 from anyview.learners.common.interfaces import Arrays
-from anyview.translator.network import ContextTranslator, to_frames, to_input
+from anyview.translator.network import ContextTranslator
+from anyview.video.pixels import to_frames, to_input
 
 _BATCH = 64
 
 
 class DemonstrationReward:
-    """-(t/T)^p (L_f/u_f + phi L_i/u_i)/(1 + phi): see ``interfaces.RewardSource``. Nothing is learned.
+    """-(t/T)^p (w_f L_f/u_f + w_i L_i/u_i)/(w_f + w_i): see ``interfaces.RewardSource``. Nothing is learned.
 
     u_f and u_i are a run's own means over t of (t/T)^p |..|^2 for a camera that keeps seeing o_0: the cost of
     standing still. So standing still earns -1 a step in every context and with every translator, one learning
-    rate serves them all, and phi has no unit. A term that is switched off is left out of sum and norm.
+    rate serves them all, and the weights have no unit. A term of weight 0 is not computed.
 
-    ``units`` (R,) brings a reward back to the equations' scale, where L_f has weight 1: reward * units =
-    L_f + phi (u_f/u_i) L_i, or L_i where L_f is off.
+    ``scales`` (R,) bring a reward back to the equations' scale, where L_f has weight 1: reward * scales =
+    L_f + phi (u_f/u_i) L_i with phi = w_i/w_f, or L_i where w_f is 0.
     """
 
     def __init__(
@@ -35,27 +36,26 @@ class DemonstrationReward:
         features: Tensor,
         images: Tensor,
         first_frames: np.ndarray,
-        params: config.Reward,
-        feature: bool = True,
-        image: bool = True,
+        weights: RewardWeights,
+        time_power: float,
     ):
         """Targets ``features`` (R, T, Z), ``images`` (R, T, 3, H, W); uint8 ``first_frames`` (R, H, W, 3)."""
         device = features.device
         self._model, self._features, self._images = model, features, images
         self._first = first_frames
         steps = features.shape[1]
-        self._weights = (torch.arange(1, steps + 1, device=device) / steps) ** params.time_power
+        self._weights = (torch.arange(1, steps + 1, device=device) / steps) ** time_power
         first = to_input(torch.from_numpy(first_frames).to(device))
         with torch.inference_mode():
             still_features = ((model.encode_expert(first)[:, None] - features) ** 2).sum(-1)
             still_images = ((first[:, None] - images) ** 2).sum((2, 3, 4))
-        feature_unit = (self._weights * still_features).mean(1).clamp_min(1e-6)
-        image_unit = (self._weights * still_images).mean(1).clamp_min(1e-6)
-        phi = params.phi if image else 0.0
-        norm = phi + (1.0 if feature else 0.0)
-        self._feature_scale = (1.0 / norm if feature else 0.0) / feature_unit[:, None]
-        self._image_scale = (phi / norm) / image_unit[:, None]
-        self.units = (feature_unit * norm if feature else image_unit).cpu().numpy()
+        feature_cost = (self._weights * still_features).mean(1).clamp_min(1e-6)
+        image_cost = (self._weights * still_images).mean(1).clamp_min(1e-6)
+        norm = weights.feature + weights.image
+        self._feature_scale = weights.feature / norm / feature_cost[:, None]
+        self._image_scale = weights.image / norm / image_cost[:, None]
+        leading = feature_cost / weights.feature if weights.feature else image_cost / weights.image
+        self.scales = (leading * norm).cpu().numpy()
 
     @torch.inference_mode()
     def step(self, frames: np.ndarray, step: int) -> np.ndarray:

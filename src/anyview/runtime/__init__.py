@@ -1,1 +1,1 @@
-"""What every stage needs and none owns: errors, seeds, checkpoints, workers, device, progress."""
+"""What every stage needs and none owns: errors, outputs, scratch, checkpoints, workers, progress."""

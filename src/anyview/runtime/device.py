@@ -33,6 +33,15 @@ def computes_bfloat16(device: "torch.device") -> bool:
     return any(found.get(name, False) for name in ("avx512_bf16", "amx_bf16"))
 
 
+def products_in(precision: str, device: "torch.device") -> "torch.autocast":
+    """A context whose matrix products are in ``precision``: bfloat16 if ``device`` has it, else float32."""
+    import torch
+
+    reduced = precision == "bfloat16" and computes_bfloat16(device)
+    # Threads would share the cache of converted weights: what each found there would be up to chance.
+    return torch.autocast(device.type, torch.bfloat16, enabled=reduced, cache_enabled=False)
+
+
 def use_threads(count: int) -> None:
     """Fix the intra-op threads: reductions split by thread count, so a fixed count keeps the bytes fixed."""
     import torch

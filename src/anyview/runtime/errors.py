@@ -4,7 +4,7 @@ import errno
 import os
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from types import FrameType
 from typing import NoReturn
 
@@ -21,6 +21,13 @@ class AnyviewError(Exception):
 
 class Terminated(BaseException):
     """SIGTERM arrived: unwind as on Ctrl-C, so that temporary outputs are removed."""
+
+
+def choose(arguments: list[str], choices: Iterable[str], usage: str) -> str:
+    """The one argument of a stage, of ``choices``. Raises AnyviewError if it is missing or another."""
+    if len(arguments) != 1 or arguments[0] not in choices:
+        raise AnyviewError(f"usage: {usage}, where {usage.split()[-1]} is one of {', '.join(choices)}")
+    return arguments[0]
 
 
 def run_stage(main: Callable[[list[str]], None]) -> NoReturn:

@@ -1,4 +1,4 @@
-"""Units of work that write files, done once: a killed stage finds what it had finished."""
+"""Tasks that write files, done once: a killed stage finds what it had finished."""
 
 import hashlib
 import json

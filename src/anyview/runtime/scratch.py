@@ -4,7 +4,7 @@
 made from (params, code, data), so that a change in any of these starts afresh and nothing stale is read.
 """
 
-import fcntl
+import errno
 import hashlib
 import json
 import os
@@ -17,11 +17,15 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
+from filelock import FileLock, Timeout
+
 KINDS = ("checkpoints", "frames")
 _AFTERWARDS = ("analysis", "report", "review", "cli")  # folders whose code only looks at what is finished
 
-# Folders of checkpoints that this process works in, each open and so locked until the process ends.
-_claimed: dict[Path, int] = {}
+_NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)  # what a file system without locks answers
+
+# Locks of the folders of checkpoints that this process works in: they end with it, even if it is killed.
+_locks: dict[Path, FileLock] = {}
 
 
 def scratch_root() -> Path:
@@ -37,6 +41,15 @@ def content_key(values: Any, files: Iterable[Path] = ()) -> str:
         with path.open("rb") as handle:
             digest.update(hashlib.file_digest(handle, "sha256").digest())
     return digest.hexdigest()[:24]
+
+
+def checkpoint_folder(values: Any, files: Iterable[Path] = ()) -> Path:
+    """Folder for checkpoints of work that depends on ``values``, on ``files`` and on our code.
+
+    ``values`` are JSON-serialisable. A change in any of these gives another folder, so that nothing stale is
+    continued.
+    """
+    return scratch_folder("checkpoints", content_key(values, files))
 
 
 def scratch_folder(kind: str, key: str) -> Path:
@@ -57,32 +70,26 @@ def scratch_folder(kind: str, key: str) -> Path:
 
 
 def _claim(folder: Path) -> bool:
-    """Make ``folder`` and keep it for this process; False where another process has it."""
-    while not _is_claimed(folder):
-        folder.mkdir(parents=True, exist_ok=True)
+    """Make ``folder`` and keep it for this process; False if another process has it.
+
+    The lock is an empty file beside the folder. It stays there, unlocked, until ``clear_scratch``.
+    """
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    lock = _locks.setdefault(folder, FileLock(_lock_file(folder), thread_local=False, fallback_to_soft=False))
+    if not lock.is_locked:
         try:
-            descriptor = os.open(folder, os.O_RDONLY)
-        except FileNotFoundError:  # the one before us has just finished and removed it
-            continue
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            os.close(descriptor)
+            lock.acquire(blocking=False)
+        except Timeout:
             return False
-        except OSError:  # a file system without locks: the work is ours alone, as a rule
-            pass
-        _claimed[folder] = descriptor
+        except OSError as error:
+            if error.errno not in _NO_LOCKS:
+                raise  # without locks, the work is ours alone, as a rule
+    folder.mkdir(exist_ok=True)
     return True
 
 
-def _is_claimed(folder: Path) -> bool:
-    """Whether this process has ``folder``; lets go of it where it was removed since."""
-    if folder not in _claimed:
-        return False
-    if folder.exists() and os.path.samestat(os.stat(folder), os.fstat(_claimed[folder])):
-        return True
-    os.close(_claimed.pop(folder))
-    return False
+def _lock_file(folder: Path) -> Path:
+    return folder.with_name(f"{folder.name}.lock")
 
 
 @cache
@@ -116,10 +123,14 @@ def clear_scratch() -> int:
     Nothing but what we put there is touched.
     """
     before = scratch_size()
+    for entry in (scratch_root() / "frames").glob("*"):
+        shutil.rmtree(entry, ignore_errors=True)
+    for folder in {entry.with_suffix("") for entry in (scratch_root() / "checkpoints").glob("*")}:
+        if _claim(folder):
+            shutil.rmtree(folder, ignore_errors=True)
+            _lock_file(folder).unlink(missing_ok=True)
+            _locks.pop(folder).release()
     for kind in KINDS:
-        for entry in (scratch_root() / kind).glob("*"):
-            if kind != "checkpoints" or not entry.is_dir() or _claim(entry):
-                shutil.rmtree(entry, ignore_errors=True)
         with suppress(OSError):  # not empty, or not there
             (scratch_root() / kind).rmdir()
     return before - scratch_size()

@@ -1,7 +1,7 @@
-"""Independent units of work, side by side: processes by default, a Ray cluster by ANYVIEW_BACKEND=ray.
+"""Independent tasks, side by side: processes by default, a Ray cluster by ANYVIEW_BACKEND=ray.
 
-Joblib has a Ray backend too, but that one runs units in actors, which are not retried when a node dies, and
-yields nothing before the last unit is done. Ray's plain tasks do both.
+Joblib has a Ray backend too, but that one runs tasks in actors, which are not retried when a node dies, and
+yields nothing before the last task is done. Ray's plain tasks do both.
 """
 
 import logging
@@ -28,36 +28,36 @@ _RETRIES = 3
 _PATIENCE = 10  # seconds for a cluster's address to answer
 
 
-def run_units(function: Callable[..., T], units: Sequence[tuple[Any, ...]]) -> Iterator[T]:
-    """Yield ``function(*unit)`` for every unit, in order, as results arrive.
+def run_tasks(function: Callable[..., T], tasks: Sequence[tuple[Any, ...]]) -> Iterator[T]:
+    """Yield ``function(*task)`` for every task, in order, as results arrive.
 
-    A unit must not depend on how many workers there are, and computes with a fixed number of threads: then
-    results have the same bytes for any number of workers. On a cluster a unit may run twice, because one
+    A task must not depend on how many workers there are, and computes with a fixed number of threads: then
+    results have the same bytes for any number of workers. On a cluster a task may run twice, because one
     whose node dies is tried again elsewhere, and every node must see the same working directory and scratch.
     """
     backend = os.environ.get("ANYVIEW_BACKEND", "local")
     if backend not in ("local", "ray"):
         raise AnyviewError(f"ANYVIEW_BACKEND={backend}: must be local or ray")
     if backend == "ray":
-        yield from _run_on_ray(function, units)
-    elif worker_count() == 1 or len(units) == 1:
-        yield from (function(*unit) for unit in units)
+        yield from _run_on_ray(function, tasks)
+    elif worker_count() == 1 or len(tasks) == 1:
+        yield from (function(*task) for task in tasks)
     else:
-        yield from _run_locally(function, units)
+        yield from _run_locally(function, tasks)
 
 
-def _run_locally(function: Callable[..., T], units: Sequence[tuple[Any, ...]]) -> Iterator[T]:
+def _run_locally(function: Callable[..., T], tasks: Sequence[tuple[Any, ...]]) -> Iterator[T]:
     with joblib.parallel_config(backend="loky", inner_max_num_threads=1):
         parallel = joblib.Parallel(
-            min(worker_count(), len(units)),
+            min(worker_count(), len(tasks)),
             return_as="generator",
             batch_size=1,
-            mmap_mode="c",  # a large array is mapped, and a unit may still write to its own
+            mmap_mode="c",  # a large array is mapped, and a task may still write to its own
             initializer=_begin_worker,
             initargs=(os.getpid(),),
         )
     try:
-        yield from parallel(joblib.delayed(function)(*unit) for unit in units)
+        yield from parallel(joblib.delayed(function)(*task) for task in tasks)
     except TerminatedWorkerError:
         raise AnyviewError(
             "a worker process was killed, perhaps for want of memory; run the same command again, "
@@ -71,12 +71,12 @@ def _begin_worker(stage: int) -> None:
     end_with_parent(stage)
 
 
-def _run_on_ray(function: Callable[..., T], units: Sequence[tuple[Any, ...]]) -> Iterator[T]:
+def _run_on_ray(function: Callable[..., T], tasks: Sequence[tuple[Any, ...]]) -> Iterator[T]:
     ray = _connect()
-    task = ray.remote(num_cpus=1, max_retries=_RETRIES)(_ray_unit)
+    remote = ray.remote(num_cpus=1, max_retries=_RETRIES)(_ray_task)
     shared = {name: value for name, value in os.environ.items() if name.startswith("ANYVIEW_")}
     function = ray.put(function)
-    pending = deque(task.remote(function, unit, os.getcwd(), shared) for unit in units)
+    pending = deque(remote.remote(function, task, os.getcwd(), shared) for task in tasks)
     try:
         while pending:
             yield ray.get(pending[0])
@@ -84,21 +84,21 @@ def _run_on_ray(function: Callable[..., T], units: Sequence[tuple[Any, ...]]) ->
     except ray.exceptions.RayTaskError as error:
         raise error.cause from None
     except ray.exceptions.RayError as error:
-        raise AnyviewError(f"Ray gave up on a unit of work after {_RETRIES} tries: {error}") from None
+        raise AnyviewError(f"Ray gave up on a task after {_RETRIES} tries: {error}") from None
     finally:
         for reference in pending:
             ray.cancel(reference, force=True)
 
 
-def _ray_unit(
-    function: Callable[..., T], unit: tuple[Any, ...], folder: str, environment: dict[str, str]
+def _ray_task(
+    function: Callable[..., T], task: tuple[Any, ...], folder: str, environment: dict[str, str]
 ) -> T:
     if not Path(folder).is_dir():
         raise AnyviewError(f"{folder}: a Ray node does not see it; keep the repository on shared storage")
     os.chdir(folder)
     os.environ.update(environment)
-    # Ray shares arrays read-only; a unit may write to its own, as it may in a local process.
-    return function(*(np.array(value) if isinstance(value, np.ndarray) else value for value in unit))
+    # Ray shares arrays read-only; a task may write to its own, as it may in a local process.
+    return function(*(np.array(value) if isinstance(value, np.ndarray) else value for value in task))
 
 
 def _connect() -> Any:

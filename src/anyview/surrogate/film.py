@@ -1,5 +1,6 @@
 """What the rig films: which demonstrations, of which kind, seen by which two webcams."""
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -94,7 +95,7 @@ def _sample_view(rng: np.random.Generator, kind: str, side: int, lens: Lens, arm
     Nobody puts a camera where the arm, at azimuth ``arm`` in the end, would hide the target.
     """
     azimuth = arm
-    while np.cos(azimuth - arm) > 0.55:
+    while math.cos(azimuth - arm) > 0.55:
         azimuth = np.radians(rng.uniform(-35, 85) if side else rng.uniform(95, 215))
     elevation = np.radians(rng.uniform(36, 54))
     distance = rng.uniform(0.82, 0.98)

@@ -3,9 +3,12 @@
 Lengths in metres, times in seconds. The table's top is the plane z = 0, the operator sits at its edge in -y.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
+
+from anyview.trigonometry import unit_vector
 
 OBJECT_RADIUS = 0.045
 TARGET_HALF = 0.065
@@ -43,13 +46,13 @@ def _try_push(rng: np.random.Generator) -> Push | None:
     start_xy = np.array([rng.uniform(-0.24, 0.24), rng.uniform(-0.20, 0.06)])
     # Pushed away from the operator or sideways: towards oneself, the tool would stand in the way.
     course = np.pi / 2 + rng.uniform(-1.25, 1.25)
-    target_xy = start_xy + rng.uniform(0.22, 0.36) * _direction(course)
+    target_xy = start_xy + rng.uniform(0.22, 0.36) * unit_vector(course)
     if abs(target_xy[0]) > 0.27 or target_xy[1] > 0.25:
         return None
     bend = rng.uniform(-0.35, 0.35)
     touch = OBJECT_RADIUS + 0.002
-    before = start_xy - (touch + 0.012) * _direction(course + bend)
-    after = target_xy - touch * _direction(course - bend)
+    before = start_xy - (touch + 0.012) * unit_vector(course + bend)
+    after = target_xy - touch * unit_vector(course - bend)
     rest = before + np.array([rng.uniform(-0.06, 0.06), -rng.uniform(0.10, 0.16)])
 
     times = np.arange(0.0, DURATION, STEP)
@@ -60,7 +63,7 @@ def _try_push(rng: np.random.Generator) -> Push | None:
 
     path = _hermite(rest, before, np.pi / 2, course + bend, approach)
     path += _hermite(before, after, course + bend, course - bend, pushed) - before
-    path -= withdrawn[:, None] * 0.07 * _direction(course - bend)
+    path -= withdrawn[:, None] * 0.07 * unit_vector(course - bend)
     sway = np.stack([_wander(rng, times, 0.5) for _ in range(2)], axis=1) * 0.0025
     tremor = np.stack([_wander(rng, times, 5.0) for _ in range(2)], axis=1) * 0.0006
     path += sway + tremor
@@ -73,30 +76,26 @@ def _try_push(rng: np.random.Generator) -> Push | None:
     cup = np.column_stack([path, height, heading])
     object_xy = _pushed_object(start_xy, cup)
     moved_early = np.linalg.norm(object_xy[times < knots[2]] - start_xy, axis=1).max() > 0.004
-    if moved_early or np.linalg.norm(object_xy[-1] - target_xy) > 0.02:
+    if moved_early or math.dist(object_xy[-1], target_xy) > 0.02:
         return None
     return Push(cup, object_xy, target_xy, rng.uniform(-0.4, 0.4))
-
-
-def _direction(angle: float) -> np.ndarray:
-    return np.array([np.cos(angle), np.sin(angle)])
 
 
 def _progress(times: np.ndarray, begin: float, end: float) -> np.ndarray:
     """Minimum-jerk progress from 0 at ``begin`` to 1 at ``end`` (Flash and Hogan 1985)."""
     s = np.clip((times - begin) / (end - begin), 0.0, 1.0)
-    return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+    return s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
 
 
 def _hermite(begin: np.ndarray, end: np.ndarray, course0: float, course1: float, s: np.ndarray) -> np.ndarray:
     """Cubic Hermite curve (T, 2) that leaves ``begin`` on ``course0`` and reaches ``end`` on ``course1``."""
-    length = np.linalg.norm(end - begin)
+    length = math.dist(begin, end)
     s = s[:, None]
+    arrived = s * s * (3 - 2 * s)
     return (
-        (2 * s**3 - 3 * s**2 + 1) * begin
-        + (s**3 - 2 * s**2 + s) * length * _direction(course0)
-        + (3 * s**2 - 2 * s**3) * end
-        + (s**3 - s**2) * length * _direction(course1)
+        (1 - arrived) * begin
+        + arrived * end
+        + s * (1 - s) * length * ((1 - s) * unit_vector(course0) - s * unit_vector(course1))
     )
 
 
@@ -104,22 +103,22 @@ def _wander(rng: np.random.Generator, times: np.ndarray, frequency: float) -> np
     """Smooth noise (T,) of unit size around ``frequency`` hertz: a hand is never quite still."""
     waves = frequency * rng.uniform(0.6, 1.6, 4)
     phases = rng.uniform(0.0, 2 * np.pi, 4)
-    return np.sin(2 * np.pi * waves * times[:, None] + phases).sum(axis=1) / np.sqrt(2.0)
+    return unit_vector(2 * np.pi * waves * times[:, None] + phases)[..., 1].sum(axis=1) / np.sqrt(2.0)
 
 
 def _pushed_object(start_xy: np.ndarray, cup: np.ndarray) -> np.ndarray:
     """Where the cup takes the object (T, 2): it moves only when crossbar or finger pushes (quasi-static)."""
-    position = start_xy.copy()
+    object_x, object_y = start_xy.tolist()
     track = np.empty((len(cup), 2))
     play = CUP_HALF_WIDTH - OBJECT_RADIUS
-    for index, (x, y, height, heading) in enumerate(cup):
-        forward = _direction(heading)
-        left = np.array([-forward[1], forward[0]])
-        offset = position - (x, y)
-        ahead, aside = offset @ forward, offset @ left
+    forward = unit_vector(cup[:, 3])
+    for index, (x, y, height, forward_x, forward_y) in enumerate(np.hstack([cup[:, :3], forward]).tolist()):
+        ahead = (object_x - x) * forward_x + (object_y - y) * forward_y
+        aside = (object_y - y) * forward_x - (object_x - x) * forward_y
         if height < 0.015 and abs(aside) < CUP_HALF_WIDTH and -OBJECT_RADIUS < ahead < CUP_DEPTH:
             ahead = max(ahead, OBJECT_RADIUS)
-            aside = np.clip(aside, -play, play)
-            position = (x, y) + ahead * forward + aside * left
-        track[index] = position
+            aside = min(max(aside, -play), play)
+            object_x = x + ahead * forward_x - aside * forward_y
+            object_y = y + ahead * forward_y + aside * forward_x
+        track[index] = object_x, object_y
     return track

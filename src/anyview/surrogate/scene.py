@@ -1,5 +1,6 @@
 """The tabletop rig as a MuJoCo scene: table, room, operator with a tool, object, target, other things."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,6 +11,7 @@ from anyview.surrogate.mjcf import geom, numbers, rgba
 from anyview.surrogate.push import CUP_DEPTH, CUP_HALF_WIDTH, OBJECT_RADIUS, TARGET_HALF, Push
 from anyview.surrogate.textures import TABLES, materials_xml, texture_files
 from anyview.surrogate.things import THING_COLOURS, Thing, thing_xml
+from anyview.trigonometry import unit_vector
 
 mujoco = load_mujoco()
 
@@ -38,12 +40,14 @@ class View:
 
     def xml(self, name: str) -> str:
         """The MJCF camera."""
-        look = np.array([np.cos(self.azimuth), np.sin(self.azimuth), 0.0])
-        back = np.cos(self.elevation) * look + np.array([0.0, 0.0, np.sin(self.elevation)])
-        right = np.array([-np.sin(self.azimuth), np.cos(self.azimuth), 0.0])
+        east, north = unit_vector(self.azimuth)
+        level, rise = unit_vector(self.elevation)
+        back = np.array([level * east, level * north, rise])
+        right = np.array([-north, east, 0.0])
         up = np.cross(back, right)
-        x = np.cos(self.roll) * right + np.sin(self.roll) * up
-        y = np.cos(self.roll) * up - np.sin(self.roll) * right
+        cosine, sine = unit_vector(self.roll)
+        x = cosine * right + sine * up
+        y = cosine * up - sine * right
         position = np.array(self.target) + self.distance * back
         place = f'pos="{numbers(*position)}" xyaxes="{numbers(*x, *y)}"'
         return f'<camera name="{name}" {place} fovy="{np.degrees(self.fovy):.4f}"/>'
@@ -86,8 +90,7 @@ class Scene:
         x, y, height, heading = cup
         self._place("object", (*object_xy, 0.0), 0.0)
         self._place("tool", (x, y, height), heading)
-        back = -np.sin(_ROD_TILT)
-        rod = np.array([back * np.cos(heading), back * np.sin(heading), np.cos(_ROD_TILT)])
+        rod = np.array([*-math.sin(_ROD_TILT) * unit_vector(heading), math.cos(_ROD_TILT)])
         wrist = np.array([x, y, height + 0.02]) + (_GRIP + 0.05) * rod
         shoulder = _lean(_SHOULDER, wrist)
         elbow = _elbow(shoulder, wrist)
@@ -98,31 +101,31 @@ class Scene:
     def _place(self, body: str, position: Sequence[float] | np.ndarray, yaw: float) -> None:
         mocap = self._model.body(body).mocapid[0]
         self._data.mocap_pos[mocap] = position
-        self._data.mocap_quat[mocap] = (np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2))
+        self._data.mocap_quat[mocap] = (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
 
     def _span(self, body: str, begin: np.ndarray, end: np.ndarray) -> None:
         mocap = self._model.body(body).mocapid[0]
         self._data.mocap_pos[mocap] = begin
-        direction = (end - begin) / np.linalg.norm(end - begin)
+        direction = (end - begin) / math.dist(begin, end)
         mujoco.mju_quatZ2Vec(self._data.mocap_quat[mocap], direction)
 
 
 def _lean(shoulder: np.ndarray, wrist: np.ndarray) -> np.ndarray:
     """The operator leans over the table when the wrist is out of reach."""
-    gap = wrist - shoulder
-    excess = np.linalg.norm(gap) - 0.97 * (_UPPER_ARM + _FOREARM)
-    return shoulder + max(float(excess), 0.0) * gap / np.linalg.norm(gap)
+    distance = math.dist(shoulder, wrist)
+    excess = max(distance - 0.97 * (_UPPER_ARM + _FOREARM), 0.0)
+    return shoulder + excess * (wrist - shoulder) / distance
 
 
 def _elbow(shoulder: np.ndarray, wrist: np.ndarray) -> np.ndarray:
     """Two-link inverse kinematics, the elbow hanging down and outwards."""
     gap = wrist - shoulder
-    reach = float(np.linalg.norm(gap))
+    reach = math.dist(shoulder, wrist)
     along = (reach**2 + _UPPER_ARM**2 - _FOREARM**2) / (2 * reach)
     aside = np.array([0.8, -0.2, -0.5])
-    aside -= (aside @ gap) * gap / reach**2
-    offset = np.sqrt(max(_UPPER_ARM**2 - along**2, 0.0))
-    return shoulder + along * gap / reach + offset * aside / np.linalg.norm(aside)
+    aside -= (aside * gap).sum() * gap / reach**2
+    offset = math.sqrt(max(_UPPER_ARM**2 - along**2, 0.0))
+    return shoulder + along * gap / reach + offset * aside / math.hypot(*aside)
 
 
 def _tool_xml(skin: str) -> str:
@@ -206,7 +209,7 @@ def _scene_xml(
     sun = rng.uniform(0.40, 0.50)
     warmth = rng.uniform(0.90, 1.0)
     angle = rng.uniform(0, 2 * np.pi)
-    lamp = (0.7 * np.cos(angle), 0.35 + 0.5 * np.sin(angle), 1.7)
+    lamp = (0.7 * math.cos(angle), 0.35 + 0.5 * math.sin(angle), 1.7)
     aim = (-lamp[0], -lamp[1], -lamp[2])
     yaw = np.degrees(push.target_yaw)
     return f"""

@@ -1,5 +1,6 @@
 """What else lies on the table: mugs, books, pens."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,8 +52,8 @@ def place_things(rng: np.random.Generator, push: Push, count: int) -> list[Thing
         x, y = rng.uniform(-0.42, 0.42), rng.uniform(-0.26, 0.34)
         radius = _RADII[shape]
         clear = np.linalg.norm(swept - (x, y), axis=1).min() > radius + 0.075
-        clear &= float(np.linalg.norm(push.target_xy - (x, y))) > radius + TARGET_HALF * 1.5
-        clear &= all(np.hypot(x - t.x, y - t.y) > radius + _RADII[t.shape] for t in placed)
+        clear &= math.dist(push.target_xy, (x, y)) > radius + TARGET_HALF * 1.5
+        clear &= all(math.dist((x, y), (t.x, t.y)) > radius + _RADII[t.shape] for t in placed)
         if clear:
             colour = THING_COLOURS[rng.integers(len(THING_COLOURS))]
             placed.append(Thing(shape, x, y, rng.uniform(0, 2 * np.pi), colour))

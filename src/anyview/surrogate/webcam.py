@@ -1,9 +1,13 @@
 """A cheap webcam: what its lens, sensor, firmware and clock do to a clean rendered picture."""
 
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
+
+from anyview.trigonometry import unit_vector
 
 _NOISE_MARGIN = 64
 
@@ -20,7 +24,7 @@ class Lens:
     def undistorted(self) -> tuple[np.ndarray, float]:
         """Where each pixel looks, (H, W, 2) tangents of a pinhole camera, and the fovy to cover them."""
         width, height = self.size
-        focal = 0.5 * height / np.tan(0.5 * self.fovy)
+        focal = 0.5 * height / math.tan(0.5 * self.fovy)
         centre = (0.5 * (width - 1), 0.5 * (height - 1))
         camera = np.array([[focal, 0, centre[0]], [0, focal, centre[1]], [0, 0, 1]])
         grid = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).reshape(-1, 1, 2)
@@ -29,7 +33,7 @@ class Lens:
         rays = cv2.undistortPoints(grid.astype(np.float64), camera, brown, criteria=until)
         rays = rays.reshape(height, width, 2)
         reach = max(np.abs(rays[..., 1]).max(), np.abs(rays[..., 0]).max() * height / width)
-        return rays, 2 * float(np.arctan(reach))
+        return rays, 2 * math.atan(reach)
 
 
 class Webcam:
@@ -43,13 +47,13 @@ class Webcam:
         """``rendered`` is (width, height) of the pictures that come in, at the lens's rendering fovy."""
         width, height = lens.size
         rays, fovy = lens.undistorted()
-        focal = 0.5 * rendered[1] / np.tan(0.5 * fovy)
+        focal = 0.5 * rendered[1] / math.tan(0.5 * fovy)
         self._map_x = (rays[..., 0] * focal + 0.5 * (rendered[0] - 1)).astype(np.float32)
         self._map_y = (rays[..., 1] * focal + 0.5 * (rendered[1] - 1)).astype(np.float32)
         self._rng = rng
         falloff = 1.0 - 0.22 * ((rays**2).sum(axis=-1) / (rays**2).sum(axis=-1).max())
         self._vignette = np.repeat(falloff[..., None], 3, axis=2).astype(np.float32)
-        self._white = np.exp(rng.normal(0.0, (0.05, 0.015, 0.05)))
+        self._white = _exponential(rng.normal(0.0, (0.05, 0.015, 0.05)))
         self._brightness = rng.uniform(0.96, 1.12)
         self._tone = _tone_curve(rng)
         shape = (height + _NOISE_MARGIN, width + _NOISE_MARGIN, 3)
@@ -84,14 +88,20 @@ class Webcam:
     def _gains(self, time: float) -> np.ndarray:
         """(H, 1, 3) float32: exposure, white balance and a flicker band that travels down the picture."""
         elapsed, self._time = time - self._time, time
-        keep = np.exp(-elapsed / 2.5)
-        spread = np.array([0.035, 0.012, 0.012]) * np.sqrt(1.0 - keep**2)
+        keep = math.exp(-elapsed / 2.5)
+        spread = np.array([0.035, 0.012, 0.012]) * math.sqrt(1.0 - keep**2)
         self._drift = keep * self._drift + spread * self._rng.normal(size=3)
         exposure, red, blue = self._drift
-        exposure += self._settling * np.exp(-time / 0.7)
-        channels = self._brightness * self._white * np.exp([exposure + red, exposure, exposure + blue])
-        band = 1.0 + self._flicker * np.sin(2 * np.pi * (self._rows + 0.37 * time))
-        return (band[:, None, None] * channels).astype(np.float32)
+        exposure += self._settling * math.exp(-time / 0.7)
+        gains = _exponential([exposure + red, exposure, exposure + blue])
+        wave = unit_vector(2 * np.pi * (self._rows + 0.37 * time))[..., 1]
+        band = 1.0 + self._flicker * wave
+        return (band[:, None, None] * (self._brightness * self._white * gains)).astype(np.float32)
+
+
+def _exponential(values: Iterable[float]) -> np.ndarray:
+    """e to the power of each of a few values, by the C library: numpy's last bit depends on the processor."""
+    return np.array([math.exp(value) for value in values])
 
 
 def frame_times(rng: np.random.Generator, duration: float) -> np.ndarray:
@@ -107,8 +117,9 @@ def frame_times(rng: np.random.Generator, duration: float) -> np.ndarray:
 def _tone_curve(rng: np.random.Generator) -> np.ndarray:
     """The firmware's contrast: a gentle S over a lifted black, (256,) uint8."""
     x = np.linspace(0.0, 1.0, 256)
-    curve = x ** rng.uniform(0.78, 0.92)
-    curve += rng.uniform(0.02, 0.06) * np.sin(2 * np.pi * (curve - 0.5)) * 0.8
+    gamma = rng.uniform(0.78, 0.92)
+    curve = np.array([level**gamma for level in x.tolist()])
+    curve += rng.uniform(0.02, 0.06) * unit_vector(2 * np.pi * (curve - 0.5))[..., 1] * 0.8
     return (np.clip(0.02 + 0.98 * curve, 0.0, 1.0) * 255).astype(np.uint8)
 
 

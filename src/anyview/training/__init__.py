@@ -1,1 +1,1 @@
-"""How networks are trained: batches, optimisation, the loop with its checkpoints."""
+"""How networks are trained: what each is trained for, and the loop that they share."""

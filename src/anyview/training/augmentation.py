@@ -11,12 +11,12 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from anyview.training.sampling import Dataset
-from anyview.translator.network import to_input
+from anyview.video.datasets import Dataset
+from anyview.video.pixels import to_input
 
-_KEPT = 0.2  # share of the clips that stay as filmed
+_KEPT = 0.2  # fraction of the clips that stay as filmed
 _DISTRACTORS = 8  # pasted at most
-_TINT = 0.6  # share of a colour of its own in each distractor
+_TINT = 0.6  # fraction of a colour of its own in each distractor
 _RADIUS = (0.04, 0.12)  # of a distractor, in widths of the frame
 _MOVING = 40  # a pixel whose grey levels span more in a clip belongs to the motion
 _HUE_WIDTH = 4.0  # concentration of the hue that is turned: about 60 degrees of the colour circle

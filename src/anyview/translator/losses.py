@@ -76,16 +76,16 @@ def batch_losses(
     """Losses of ``paired`` (2N, 3, H, W), o_t^i and after them o_t^j, and ``context`` o_0^j (N, 3, H, W).
 
     Frames are in [-1, 1]. With ``wanted`` only the losses whose weight is above 0 are computed; ``noise``
-    turns dropout on. Both decodings share what the decoder makes of the skips.
+    turns dropout on. What the decoder makes of the skips is computed once for both decodings.
     """
     target = paired[len(context) :]
     z1, z_true = model.encode_expert(paired, noise).chunk(2)
     z2, skips = model.encode_context(context, noise)
     z3 = model.translate(z1, z2, noise)
-    shares = model.decoder.shares(skips)
+    skip_terms = model.decoder.skip_terms(skips)
 
     def decoding_loss(z: Tensor) -> Tensor:
-        return frame_loss(model.decoder(z, shares, noise), target)
+        return frame_loss(model.decoder(z, skip_terms, noise), target)
 
     return Losses(
         decoding_loss(z3) if wanted is None or wanted.translation else None,

@@ -6,7 +6,7 @@ T(z1, z2) -> z3, and Dec(z3, skips of Enc2(o_0^j)) is the expert's frame as the 
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, cast
+from typing import Literal, NamedTuple, cast
 
 import numpy as np
 import torch
@@ -14,10 +14,10 @@ from torch import Generator, Tensor, nn
 from torch.nn import functional as F
 
 from anyview.runtime.errors import AnyviewError
+from anyview.translator.convolutions import KERNEL, fractional_convolution
 
 ArchitectureName = Literal["real", "sim", "compact"]
 
-_KERNEL = 5
 _LEAK = 0.2
 _COLOURS = 3
 
@@ -63,18 +63,6 @@ ARCHITECTURES: dict[ArchitectureName, Architecture] = {
 }
 
 
-def to_input(frames: np.ndarray | Tensor) -> Tensor:
-    """Network input (..., 3, H, W) in [-1, 1], float32, of uint8 ``frames`` (..., H, W, 3)."""
-    pixels = frames if isinstance(frames, Tensor) else torch.tensor(frames)
-    return pixels.movedim(-1, -3).to(torch.float32).div_(127.5).sub_(1.0)
-
-
-def to_frames(output: Tensor) -> np.ndarray:
-    """uint8 frames (..., H, W, 3) of network output (..., 3, H, W)."""
-    pixels = output.detach().float().add(1.0).mul(127.5).round_().clamp_(0.0, 255.0)
-    return pixels.to(torch.uint8).movedim(-3, -1).cpu().numpy()
-
-
 class Encoder(nn.Module):
     """Four convolutions and two connected layers: (N, 3, H, W) -> z (N, width) and the four maps."""
 
@@ -82,7 +70,7 @@ class Encoder(nn.Module):
         super().__init__()
         channels = [_COLOURS, *(count for count, _ in architecture.encoder)]
         self.convolutions = nn.ModuleList(
-            nn.Conv2d(before, after, _KERNEL, stride, padding=_KERNEL // 2)
+            nn.Conv2d(before, after, KERNEL, stride, padding=KERNEL // 2)
             for before, (after, stride) in zip(channels, architecture.encoder, strict=False)
         )
         side = image_size // architecture.stride
@@ -114,7 +102,7 @@ class Translation(nn.Module):
         return self.output(_drop(hidden, self._dropout, noise))
 
 
-class Share(NamedTuple):
+class SkipTerms(NamedTuple):
     """What a ``SkipConvolution`` computes once for everything that is decoded in the same K contexts."""
 
     weight: Tensor
@@ -130,81 +118,24 @@ class SkipConvolution(nn.ConvTranspose2d):
     """
 
     def __init__(self, below: int, skip: int, channels: int, stride: int):
-        super().__init__(below + skip, channels, _KERNEL, stride, _KERNEL // 2, output_padding=stride - 1)
+        super().__init__(below + skip, channels, KERNEL, stride, KERNEL // 2, output_padding=stride - 1)
         self._parts = [below, skip]
 
-    def share(self, skip: Tensor) -> Share:
+    def skip_terms(self, skip: Tensor) -> SkipTerms:
         """What ``forward`` needs besides the layer below, of Enc2's map ``skip`` (K, ...)."""
         weight, skip_weight = self.weight.split(self._parts)
-        return Share(weight, self._convolve(skip, skip_weight, self.bias))
+        return SkipTerms(weight, self._convolve(skip, skip_weight, self.bias))
 
-    def forward(self, x: Tensor, share: Share) -> Tensor:  # type: ignore[override]
-        """The layer's output for ``x`` (N, ...) and the ``share`` of K contexts, row n modulo K."""
-        own = self._convolve(x, share.weight, None)
-        known = share.map
+    def forward(self, x: Tensor, terms: SkipTerms) -> Tensor:  # type: ignore[override]
+        """The layer's output for ``x`` (N, ...) and the ``terms`` of K contexts, row n modulo K."""
+        own = self._convolve(x, terms.weight, None)
+        known = terms.map
         if len(known) != len(own):
             known = known.repeat(len(own) // len(known), 1, 1, 1)
         return own.add_(known)
 
     def _convolve(self, x: Tensor, weight: Tensor, bias: Tensor | None) -> Tensor:
-        return cast(Tensor, _FractionalConvolution.apply(x, weight.to(x.dtype), bias, self.stride[0]))
-
-
-class _FractionalConvolution(torch.autograd.Function):
-    """PyTorch's ``conv_transpose2d``, x (N, K, H, W) -> (N, C, sH, sW), where that is slow on a processor.
-
-    Forward is where it ends in the few colours, backward where there is a bias.
-    """
-
-    @staticmethod
-    def forward(ctx: Any, x: Tensor, weight: Tensor, bias: Tensor | None, stride: int) -> Tensor:
-        ctx.save_for_backward(x, weight)
-        ctx.stride = stride
-        if stride == 2 and weight.shape[1] == _COLOURS:
-            return _double_to_colours(x, weight, bias)
-        return F.conv_transpose2d(x, weight, bias, stride, _KERNEL // 2, stride - 1)
-
-    @staticmethod
-    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor | None, ...]:
-        x, weight = ctx.saved_tensors
-        of_x, of_weight, of_bias, _ = ctx.needs_input_grad
-        stride, half, one = [ctx.stride] * 2, [_KERNEL // 2] * 2, [1, 1]
-        output_padding, wanted = [ctx.stride - 1] * 2, [of_x, of_weight, False]
-        x_gradient, weight_gradient, _ = torch.ops.aten.convolution_backward(
-            gradient, x, weight, None, stride, half, one, True, output_padding, 1, wanted
-        )
-        return x_gradient, weight_gradient, _sum_over_places(gradient) if of_bias else None, None
-
-
-def _double_to_colours(x: Tensor, weight: Tensor, bias: Tensor | None) -> Tensor:
-    """The fractional convolution of stride 2 that ends in colours, x (N, K, H, W) -> (N, 3, 2H, 2W).
-
-    Its even and odd rows and columns are four plain 3x3 convolutions of ``x``: done as one, they take less
-    than half the time.
-    """
-    inputs, outputs = weight.shape[:2]
-    # Output 2y + a takes input y + d by the weight at k = a + 2 - 2d: of six places, counted from the
-    # last, the one at 2(d + 1) + 1 - a.
-    taps = F.pad(weight, (0, 1, 0, 1)).flip(2, 3).view(inputs, outputs, 3, 2, 3, 2).flip(3, 5)
-    kernel = taps.permute(3, 5, 1, 0, 2, 4).reshape(4 * outputs, inputs, 3, 3)
-    parts = F.conv2d(x, kernel, None if bias is None else bias.repeat(4), padding=1)
-    # Colours come last in memory, two columns' beside each other: only rows and columns change places.
-    places = parts.movedim(1, -1).unflatten(-1, (2, -1)).transpose(2, 3)
-    shape = len(x), outputs, 2 * x.shape[2], 2 * x.shape[3]
-    output = torch.empty(shape, dtype=x.dtype, device=x.device, memory_format=torch.channels_last)
-    output.movedim(1, -1).view_as(places).copy_(places)
-    return output
-
-
-def _sum_over_places(gradient: Tensor) -> Tensor:
-    """A bias's gradient (C,) of the ``gradient`` (N, C, H, W) of what it was added to."""
-    if gradient.device.type != "cpu":
-        return gradient.sum((0, 2, 3))
-    # Place after place of a picture, then picture after picture, in float32: PyTorch's own order, so the same
-    # bits. But a bag of embeddings does all channels at once, in a twentieth of the time.
-    places = gradient.movedim(1, -1).flatten(0, 2).float()
-    pictures = F.embedding_bag(torch.arange(len(places)).view(len(gradient), -1), places, mode="sum")
-    return F.embedding_bag(torch.arange(len(pictures))[None], pictures, mode="sum")[0].to(gradient.dtype)
+        return fractional_convolution(x, weight.to(x.dtype), bias, self.stride[0])
 
 
 class Decoder(nn.Module):
@@ -222,19 +153,19 @@ class Decoder(nn.Module):
             for below, skip, (channels, stride) in zip(inputs, skips, architecture.decoder, strict=False)
         )
 
-    def shares(self, skips: list[Tensor]) -> list[Share]:
+    def skip_terms(self, skips: list[Tensor]) -> list[SkipTerms]:
         """What each convolution needs of Enc2's maps, for ``forward``."""
         layers = cast(Iterable[SkipConvolution], self.convolutions)
-        return [layer.share(skip) for layer, skip in zip(layers, reversed(skips), strict=True)]
+        return [layer.skip_terms(skip) for layer, skip in zip(layers, reversed(skips), strict=True)]
 
-    def forward(self, z: Tensor, shares: list[Share], noise: Generator | None = None) -> Tensor:
+    def forward(self, z: Tensor, skip_terms: list[SkipTerms], noise: Generator | None = None) -> Tensor:
         hidden = _drop(_activate(self.hidden(z)), self._dropout, noise)
         x = hidden.unflatten(1, (self._side, self._side, -1)).movedim(-1, 1)
-        *layers, last = zip(self.convolutions, shares, strict=True)
-        for convolution, share in layers:
-            x = _activate(convolution(x, share))
-        convolution, share = last
-        return convolution(x, share)
+        *layers, last = zip(self.convolutions, skip_terms, strict=True)
+        for convolution, terms in layers:
+            x = _activate(convolution(x, terms))
+        convolution, terms = last
+        return convolution(x, terms)
 
 
 def _activate(x: Tensor) -> Tensor:
@@ -297,4 +228,4 @@ class ContextTranslator(nn.Module):
 
         Row n is decoded in context n modulo K: one context serves a whole clip, for example.
         """
-        return self.decoder(z, self.decoder.shares(skips))
+        return self.decoder(z, self.decoder.skip_terms(skips))

@@ -22,10 +22,10 @@ LearnerName = Literal["ddpg", "trpo"]
 _DESCRIPTION = "policy.json"
 
 
-def with_time_bumps(observations: Tensor, count: int) -> Tensor:
-    """``observations`` (..., O), then their last entry, time in [-1, 1], as ``count`` Gaussian bumps.
+def with_time_features(observations: Tensor, count: int) -> Tensor:
+    """``observations`` (..., O), then ``count`` radial basis functions of their last entry, time in [-1, 1].
 
-    Bump k of n has its centre at -1 + 2 k/(n - 1) and a standard deviation of 0.8 of the spacing.
+    Function k of n is a Gaussian with its centre at -1 + 2 k/(n - 1) and a deviation of 0.8 of the spacing.
     """
     centres = torch.linspace(-1, 1, count, device=observations.device)
     away = (observations[..., -1:] - centres) * ((count - 1) / 2)
@@ -37,7 +37,7 @@ class Policy:
     """One run's deterministic policy, its context and the control that it was trained for.
 
     ``weights`` are ``weight<i>`` (in, out) and ``bias<i>`` (out). DDPG has ReLU layers, a tanh at the end and
-    time bumps beside the observation; TRPO has tanh layers and clips its mean to [-1, 1].
+    radial basis functions of time beside the observation; TRPO has tanh layers and clips its mean to [-1, 1].
     """
 
     learner: LearnerName
@@ -52,7 +52,7 @@ class Policy:
         layers = len(self.weights) // 2
         ddpg = self.learner == "ddpg"
         if ddpg:
-            x = with_time_bumps(x, len(self.weights["weight0"]) - len(x))
+            x = with_time_features(x, len(self.weights["weight0"]) - len(x))
         for index in range(layers):
             weight, bias = (torch.from_numpy(self.weights[f"{kind}{index}"]) for kind in ("weight", "bias"))
             x = x @ weight + bias

@@ -13,7 +13,7 @@ import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from anyview.report.words import subscripts
+from anyview.report.formatting import subscripts
 
 INK = "#1b1f24"
 QUIET = "#6b7280"

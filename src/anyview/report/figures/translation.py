@@ -5,12 +5,12 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter, NullLocator
 
-from anyview.report import thesis
+from anyview.analysis import thesis
 from anyview.report.figures.style import BLUE, INK, QUIET, SKY, THESIS, WIDTH, canvas
 from anyview.report.pictures import Strip
 
 
-def training(curve: pd.DataFrame, reference: thesis.TrainingRun) -> Figure:
+def training(curve: pd.DataFrame, reference: thesis.PublishedRun) -> Figure:
     """Figures 13 and 14: total and validation loss over iterations, and the points that the thesis states.
 
     ``curve`` has columns ``iteration, loss, validation_loss``.
@@ -36,7 +36,7 @@ def training(curve: pd.DataFrame, reference: thesis.TrainingRun) -> Figure:
         return figure
 
 
-def feature_weights(weights: np.ndarray) -> Figure:
+def feature_weights(weights: pd.Series) -> Figure:
     """Figure 15: weight of each frame, (T,), beside the thesis's, scaled to the same sum of 1.
 
     The thesis's line has gaps where its text states nothing.

@@ -1,0 +1,1 @@
+"""What GAIL and TPIL share."""

@@ -1,0 +1,177 @@
+"""Rewards learned from video alone: one discriminator a run tells the expert's frames from the agent's.
+
+What GAIL and TPIL share: gathering the agent's episodes, drawing batches, training side by side, checkpoints.
+Shapes: R runs, C copies of a run's context, T actions an episode, B a batch; frames are uint8 RGB (H, W, 3).
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from anyview import config
+from anyview.learners.common.interfaces import Arrays
+from anyview.seeds import stream, torch_seed
+from anyview.video.pixels import to_input
+
+
+@dataclass(frozen=True)
+class Views:
+    """A batch: ``now`` o_t and ``before`` o_max(t - lag, 1), (B, 3, H, W) in [-1, 1]; ``time`` t/T (B,)."""
+
+    before: Tensor
+    now: Tensor
+    time: Tensor
+
+
+@dataclass(frozen=True)
+class ClipSet:
+    """The clips ``rows`` of ``frames`` (N, T + 1, H, W, 3), an array or a memory map."""
+
+    frames: np.ndarray
+    rows: np.ndarray
+
+    def draw(self, rng: np.random.Generator, count: int, lag: int) -> Views:
+        """``count`` views of random clips at random times 1 to T."""
+        clips, last = rng.choice(self.rows, count), self.frames.shape[1] - 1
+        times = rng.integers(1, last + 1, size=count)
+        now = to_input(self.frames[clips, times])
+        before = to_input(self.frames[clips, np.maximum(times - lag, 1)]) if lag else now
+        return Views(before, now, torch.from_numpy(times / last).float())
+
+
+class Discriminator(nn.Module):
+    """One run's network. Batches come by the name of their set: "expert", "agent" and what else it needs."""
+
+    lag = 0
+
+    def logits(self, views: Views) -> Tensor:
+        """log P(expert)/P(not expert), (B,)."""
+        raise NotImplementedError
+
+    def reward(self, logits: Tensor) -> Tensor:
+        """The reward of what is seen."""
+        raise NotImplementedError
+
+    def loss(self, views: Mapping[str, Views]) -> Tensor:
+        """What training minimises, a scalar."""
+        raise NotImplementedError
+
+    def accuracies(self, views: Mapping[str, Views]) -> dict[str, Tensor]:
+        """Fractions told right, by name."""
+        expected = {name: name == "expert" for name in views}
+        return {
+            f"{name}_accuracy": ((self.logits(batch) > 0) == expected[name]).float().mean()
+            for name, batch in views.items()
+        }
+
+
+def cross_entropy(logits: Tensor, label: float) -> Tensor:
+    """Mean binary cross-entropy of ``logits`` (B,) that should all say ``label`` (0 or 1)."""
+    return F.binary_cross_entropy_with_logits(logits, torch.full_like(logits, label))
+
+
+class LearnedReward:
+    """What R discriminators make of the agents' frames; see ``interfaces.RewardSource``.
+
+    They stay as they are while ``episodes`` episodes of each run are gathered, as many as the learner takes
+    for one policy step, so that all rewards of a policy step have one scale. Then each takes ``params.steps``
+    Adam steps on batches of these episodes and of ``sets[r]``, run r's sets of others' clips by name.
+    ``networks`` are the discriminators, one a run.
+    """
+
+    def __init__(
+        self,
+        make: Callable[[], Discriminator],
+        params: config.Discriminator,
+        seed: int,
+        runs: Sequence[int],
+        sets: Sequence[Mapping[str, ClipSet]],
+        episodes: int,
+    ):
+        self._params, self._seed, self._runs = params, seed, list(runs)
+        self._sets, self._episodes = list(sets), episodes
+        self.networks: list[Discriminator] = []
+        with torch.random.fork_rng(devices=[]):
+            for run in runs:
+                torch.manual_seed(torch_seed(seed, "discriminator-weights", run))
+                self.networks.append(make())
+        self._modules = nn.ModuleList(self.networks)
+        self._optimizer = torch.optim.Adam(self._modules.parameters(), params.learning_rate)
+        self._shape = sets[0]["expert"].frames.shape[1:]
+        self._iteration = 0
+        self._seen = np.zeros((len(self._runs), 0, *self._shape), np.uint8)
+        self._gathered = self._seen
+
+    @torch.inference_mode()
+    def step(self, frames: np.ndarray, step: int) -> np.ndarray:
+        """Rewards (R, C) of ``frames`` (R, C, H, W, 3) seen after action ``step`` (1 to T)."""
+        runs, copies = frames.shape[:2]
+        if step == 1:
+            self._seen = np.zeros((runs, copies, *self._shape), np.uint8)
+        self._seen[:, :, step] = frames
+        time = torch.full((copies,), step / (self._shape[0] - 1))
+        rewards = []
+        for network, seen in zip(self.networks, self._seen, strict=True):
+            now, before = to_input(seen[:, step]), to_input(seen[:, max(step - network.lag, 1)])
+            rewards.append(network.reward(network.logits(Views(before, now, time))))
+        return torch.stack(rewards).numpy()
+
+    def end_iteration(self) -> Arrays:
+        """Accuracies (R,) on the iteration's frames, before learning from them when enough are gathered."""
+        with torch.inference_mode():
+            measures = [
+                network.accuracies(self._draw(row, self._seen, "discriminator-measures", self._iteration))
+                for row, network in enumerate(self.networks)
+            ]
+        self._gathered = np.concatenate([self._gathered, self._seen], axis=1)
+        self._iteration += 1
+        if self._gathered.shape[1] >= self._episodes:
+            for index in range(self._params.steps):
+                self._learn(index)
+            self._gathered = self._gathered[:, :0]
+        return {name: np.array([each[name].item() for each in measures]) for name in measures[0]}
+
+    def _learn(self, index: int) -> None:
+        """One step of every discriminator: a sum of losses that share no weights."""
+        batches = (
+            self._draw(row, self._gathered, "discriminator-batch", self._iteration, index)
+            for row in range(len(self._runs))
+        )
+        losses = [network.loss(views) for network, views in zip(self.networks, batches, strict=True)]
+        self._optimizer.zero_grad()
+        torch.stack(losses).sum().backward()
+        self._optimizer.step()
+
+    def _draw(self, row: int, agent: np.ndarray, name: str, *indices: int) -> dict[str, Views]:
+        """A batch of each of run ``row``'s sets and of its ``agent`` clips (R, E, T + 1, H, W, 3)."""
+        rng = stream(self._seed, name, self._runs[row], *indices)
+        sets = {**self._sets[row], "agent": ClipSet(agent[row], np.arange(agent.shape[1]))}
+        lag, count = self.networks[row].lag, self._params.batch_size
+        return {name: clips.draw(rng, count, lag) for name, clips in sets.items()}
+
+    def state(self) -> Arrays:
+        """Between iterations: networks, optimiser and gathered episodes."""
+        arrays = {f"network/{name}": value.numpy() for name, value in self._modules.state_dict().items()}
+        for index, state in self._optimizer.state_dict()["state"].items():
+            arrays |= {f"optimizer/{index}/{key}": value.numpy() for key, value in state.items()}
+        return arrays | {"gathered": self._gathered, "iteration": np.array([self._iteration])}
+
+    def restore(self, state: Arrays) -> None:
+        """Continue from ``state()`` bit for bit."""
+        self._gathered, self._iteration = state["gathered"], int(state["iteration"][0])
+        network: dict[str, Tensor] = {}
+        moments: dict[int, dict[str, Tensor]] = {}
+        for name, array in state.items():
+            kind, _, rest = name.partition("/")
+            # Copies: the optimiser works in place.
+            if kind == "network":
+                network[rest] = torch.tensor(array)
+            elif kind == "optimizer":
+                index, key = rest.split("/")
+                moments.setdefault(int(index), {})[key] = torch.tensor(array)
+        self._modules.load_state_dict(network)
+        self._optimizer.load_state_dict(self._optimizer.state_dict() | {"state": moments})

@@ -1,0 +1,50 @@
+"""The cells that the analysis knows by name: labels, groups and order."""
+
+from collections.abc import Iterable
+
+OURS = "ours"
+ADAM, ADADELTA, AUGMENTED, SIM = "real-adam", "real-adadelta", "real-augmented", "sim"
+
+LABELS = {
+    "ours": "Ours (DDPG, diverse)",
+    "oracle": "Oracle (true view)",
+    "ours-trpo": "TRPO, diverse",
+    "narrow-ddpg": "DDPG, narrow",
+    "liu": "Liu (TRPO, narrow)",
+    "tcn": "TCN embedding",
+    "tpil": "TPIL",
+    "gail": "GAIL",
+    "no-translation": "without L_tr",
+    "no-reconstruction": "without L_rec",
+    "no-alignment": "without L_align",
+    "no-reconstruction-alignment": "without L_rec, L_align",
+    "no-feature-reward": "without L_f",
+    "no-image-reward": "without L_i",
+}
+
+ABLATIONS = tuple(cell for cell in LABELS if cell.startswith("no-"))
+"""Figure 20: a loss of the translator, or a term of the reward, left out."""
+
+FACTORIAL = (("liu", "narrow-ddpg"), ("ours-trpo", "ours"))
+"""The 2x2 that the thesis leaves open: rows narrow and diverse contexts, columns TRPO and DDPG."""
+
+
+def label(cell: str) -> str:
+    """What a reader sees; a cell that a user added keeps its own name."""
+    return LABELS.get(cell, cell)
+
+
+def in_order(cells: Iterable[str]) -> list[str]:
+    """Known cells in the order of the labels, then the others by name."""
+    known = list(LABELS)
+    return sorted(cells, key=lambda cell: (known.index(cell) if cell in LABELS else len(known), cell))
+
+
+def compared(cells: Iterable[str]) -> list[str]:
+    """Cells of figure 19: every method that is no ablation."""
+    return [cell for cell in in_order(cells) if cell not in ABLATIONS]
+
+
+def ablated(cells: Iterable[str]) -> list[str]:
+    """Cells of figure 20: `ours` and its ablations."""
+    return [cell for cell in in_order(cells) if cell == OURS or cell in ABLATIONS]

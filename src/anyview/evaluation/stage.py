@@ -1,0 +1,76 @@
+"""What stages `imitate` and `discriminate` do: from a cell of params.yaml to the folder of its policies."""
+
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from anyview import paths
+from anyview.config import Params
+from anyview.evaluation.demonstrations import imitated_demonstrations
+from anyview.evaluation.methods import Method
+from anyview.evaluation.runs import evaluate_group, groups_of
+from anyview.learners.common.policies import save_policies
+from anyview.pusher.contexts import sample_contexts
+from anyview.runtime.outputs import whole_folder, write_atomically
+from anyview.runtime.scratch import checkpoint_folder
+from anyview.runtime.workers import run_tasks
+from anyview.seeds import stream
+from anyview.video.files import write_video
+
+RATE = 10.0  # frames a second
+
+
+def evaluate_method(name: str, params: Params, method: Method, sources: Sequence[Path]) -> None:
+    """Train and evaluate the policies of cell ``name`` into its folder; continues from its checkpoints.
+
+    ``sources`` are the folders that its reward is made from, beside the demonstrations.
+
+    - ``runs.csv``: a row for each run, and how it ended;
+    - ``curve.csv``: the learning curve of each run;
+    - ``policy-<run>.safetensors`` and ``policy.json``: see ``learners.common.policies``;
+    - ``rollouts/run-<run>.avi``: the agent's frames with the imitated demonstration to their right;
+    - ``demonstrations.csv``: the clips that are imitated.
+    """
+    contexts, _ = sample_contexts(stream(params.base.seed, "evaluation"), params.imitation.runs)
+    chosen, demonstrations = imitated_demonstrations(params)
+    groups = groups_of(len(contexts))
+    values, files = _origin(name, params, sources)
+    scratch = [checkpoint_folder([*values, index], files) for index in range(len(groups))]
+    tasks = [
+        (name, params, method, group, [contexts[run] for run in group], demonstrations, folder)
+        for group, folder in zip(groups, scratch, strict=True)
+    ]
+    results = list(run_tasks(evaluate_group, tasks))
+    runs = pd.concat([result.runs for result in results], ignore_index=True)
+    curve = pd.concat([result.curve for result in results], ignore_index=True)
+    with whole_folder(paths.policies(name)) as output:
+        write_atomically(output / "demonstrations.csv", pd.DataFrame({"clip": chosen}).to_csv(index=False))
+        write_atomically(output / "runs.csv", runs.to_csv(index=False))
+        write_atomically(output / "curve.csv", curve.sort_values(["iteration", "run"]).to_csv(index=False))
+        weights = {
+            each: np.concatenate([result.policies[each] for result in results])
+            for each in results[0].policies
+        }
+        learner, sim = params.methods[name].learner, params.sim
+        save_policies(output, weights, contexts, learner, sim.control, sim.image_size)
+        (output / "rollouts").mkdir()
+        for run, rollout in enumerate(np.concatenate([result.rollouts for result in results])):
+            write_video(output / "rollouts" / f"run-{run:02d}.avi", rollout, RATE)
+    for folder in scratch:
+        shutil.rmtree(folder)
+    distance = 100 * runs["final_distance"].median()
+    print(f"{name}: {runs['success'].sum()} of {len(runs)} succeed; median distance {distance:.1f} cm")
+
+
+def _origin(name: str, params: Params, sources: Sequence[Path]) -> tuple[list[Any], list[Path]]:
+    """The values and files that the checkpoints of a cell depend on."""
+    values = params.model_dump(include={"base", "sim", "imitation", "adversarial"})
+    for block in ("imitation", "adversarial"):
+        values[block]["cells"] = values[block]["cells"].get(name)
+    dataset = params.imitation.dataset
+    files = [paths.clip_set(dataset) / "files.csv", paths.split_table(dataset)]
+    return [name, values], files + [file for source in sources for file in sorted(source.iterdir())]

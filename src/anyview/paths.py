@@ -1,0 +1,39 @@
+"""Where the pipeline keeps what it makes, relative to the root of the repository."""
+
+from pathlib import Path
+
+DATA = Path("data")
+METRICS = Path("metrics")
+REPORT = DATA / "report"
+
+REAL = "real"  # the set of clips that ingest makes; the others are simulated
+
+
+def raw(source: str) -> Path:
+    """Video files as a camera left them: ``surrogate`` or ``recorded``."""
+    return DATA / "raw" / source
+
+
+def clip_set(name: str) -> Path:
+    """A set of clips (see ``video.sets``)."""
+    return DATA / "clips" / name
+
+
+def split_table(name: str) -> Path:
+    """Which clips of the set ``name`` train, validate and are extreme."""
+    return DATA / "splits" / f"{name}.csv"
+
+
+def model(cell: str) -> Path:
+    """Weights of a translator or an embedding."""
+    return DATA / "models" / cell
+
+
+def translations(cell: str) -> Path:
+    """What a translator makes of held-out clips."""
+    return DATA / "translations" / cell
+
+
+def policies(cell: str) -> Path:
+    """Policies of a method and how they end."""
+    return DATA / "policies" / cell

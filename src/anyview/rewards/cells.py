@@ -1,0 +1,55 @@
+"""From a cell of ``imitation.cells`` to its reward."""
+
+from typing import TypeVar
+
+import numpy as np
+
+from anyview import paths
+from anyview.config import DemonstrationCell, EmbeddingRewardCell
+from anyview.embedding.network import Embedding
+from anyview.embedding.weights import load_embedding
+from anyview.evaluation.methods import Group, Scoring, first_demonstration
+from anyview.rewards.demonstration import DemonstrationReward, translate_demonstrations, true_demonstrations
+from anyview.rewards.embedding import EmbeddingReward
+from anyview.runtime.device import torch_device
+from anyview.runtime.errors import AnyviewError
+from anyview.translator.network import ContextTranslator
+from anyview.translator.weights import load_translator
+
+Model = TypeVar("Model", ContextTranslator, Embedding)
+
+
+def make_reward(group: Group) -> Scoring:
+    """The cell's reward. Raises AnyviewError if its model was trained on frames of another size."""
+    if isinstance(group.cell, EmbeddingRewardCell):
+        return _embedded(group, group.cell)
+    assert isinstance(group.cell, DemonstrationCell)
+    return _demonstrated(group, group.cell)
+
+
+def _demonstrated(group: Group, cell: DemonstrationCell) -> Scoring:
+    """The translated demonstration's reward, or the Oracle's against the true one."""
+    model = _fitting(load_translator(paths.model(cell.model)), cell.model, group.params.sim.image_size)
+    first = np.ascontiguousarray(group.own[:, 0])
+    if cell.reward == "true":
+        targets = true_demonstrations(model, group.own)
+    else:
+        targets = translate_demonstrations(model, group.demonstrations, first)
+    reward = DemonstrationReward(model, *targets, first, cell.weights, cell.time_power)
+    return Scoring(reward, reward.scales, reward.targets(), fixed=True)
+
+
+def _embedded(group: Group, cell: EmbeddingRewardCell) -> Scoring:
+    """The distance to the demonstrations in a time-contrastive embedding, which nothing translates."""
+    model = _fitting(load_embedding(paths.model(cell.model)), cell.model, group.params.sim.image_size)
+    reward = EmbeddingReward(model, group.demonstrations, group.own[:, 0], cell.time_power)
+    return Scoring(reward, reward.scales, first_demonstration(group), fixed=True)
+
+
+def _fitting(model: Model, name: str, size: int) -> Model:
+    if model.image_size != size:
+        raise AnyviewError(
+            f"{paths.model(name)}: for frames of {model.image_size} pixels, but sim.image_size is {size}; "
+            "train it again"
+        )
+    return model.to(torch_device())

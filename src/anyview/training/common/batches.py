@@ -1,0 +1,73 @@
+"""Batches to learn from: two clips' frames of the same times, the pairs drawn from streams of their own."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from anyview.video.datasets import Dataset, clip_pairs
+
+
+@dataclass(frozen=True)
+class FramePairs:
+    """Frames ``times`` of clips ``sources`` (i) and ``targets`` (j): N pairs, of one frame each or of K.
+
+    ``sources`` and ``targets`` are (N,) and ``times`` is (N,), or all three are (N, 1), (N, 1) and (N, K).
+    """
+
+    sources: np.ndarray
+    targets: np.ndarray
+    times: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def parts(self, count: int) -> list["FramePairs"]:
+        """The pairs in ``count`` runs of about equal length, fewer if there are fewer pairs."""
+        bounds = np.linspace(0, len(self), min(count, len(self)) + 1).round().astype(int)
+        return [
+            FramePairs(self.sources[a:b], self.targets[a:b], self.times[a:b]) for a, b in pairwise(bounds)
+        ]
+
+    def frames(self, dataset: Dataset) -> np.ndarray:
+        """o_t^i and after them o_t^j, uint8 (2N, H, W, 3) or (2N, K, H, W, 3)."""
+        clips = np.concatenate((self.sources, self.targets))
+        return dataset.frames[clips, np.concatenate((self.times, self.times))]
+
+    def contexts(self, dataset: Dataset) -> np.ndarray:
+        """o_0^j, uint8 (N, H, W, 3); of pairs of one frame each."""
+        return dataset.frames[self.targets, 0]
+
+
+def training_pairs(dataset: Dataset, rng: np.random.Generator, count: int) -> FramePairs:
+    """``count`` pairs: any two different clips of the training split, at the same random time."""
+    clips = dataset.split("train")
+    sources = rng.integers(len(clips), size=count)
+    targets = (sources + rng.integers(1, len(clips), size=count)) % len(clips)
+    times = rng.integers(dataset.length, size=count)
+    return FramePairs(clips[sources], clips[targets], times)
+
+
+def validation_pairs(dataset: Dataset, rng: np.random.Generator, count: int) -> FramePairs:
+    """``count`` fixed frame pairs: the validation clips' pairs in turn, each at a random time."""
+    pairs = np.array(clip_pairs(dataset, "validation"))
+    chosen = pairs[np.arange(count) % len(pairs)]
+    return FramePairs(chosen[:, 0], chosen[:, 1], rng.integers(dataset.length, size=count))
+
+
+def training_triplets(dataset: Dataset, rng: np.random.Generator, count: int, times: int) -> FramePairs:
+    """``count`` pairs of different training clips at ``times`` different random times each.
+
+    A triplet is a frame of one clip, and two of the other clip: of the same time, and of another time.
+    """
+    clips = dataset.split("train")
+    chosen = np.stack([rng.choice(clips, 2, replace=False) for _ in range(count)])
+    drawn = np.stack([rng.permutation(dataset.length)[:times] for _ in range(count)])
+    return FramePairs(chosen[:, :1], chosen[:, 1:], drawn)
+
+
+def validation_triplets(dataset: Dataset, count: int) -> FramePairs:
+    """The first ``count`` pairs of validation clips, all their frames."""
+    chosen = np.array(clip_pairs(dataset, "validation")[:count])
+    times = np.broadcast_to(np.arange(dataset.length), (len(chosen), dataset.length))
+    return FramePairs(chosen[:, :1], chosen[:, 1:], times)

@@ -1,0 +1,89 @@
+"""Data sets: clips with the split of each, and which of the held-out clips are paired."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from anyview import paths
+from anyview.runtime.errors import AnyviewError
+from anyview.video.sets import open_frames
+from anyview.video.splits import read_split
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """Clips and their splits: ``frames`` uint8 (N, T, H, W, 3), ``clips`` one row for each with its split."""
+
+    name: str
+    frames: np.ndarray
+    clips: pd.DataFrame
+
+    @property
+    def length(self) -> int:
+        """Frames of a clip."""
+        return self.frames.shape[1]
+
+    @property
+    def image_size(self) -> int:
+        """Height and width of a frame."""
+        return self.frames.shape[2]
+
+    def split(self, name: str) -> np.ndarray:
+        """Indices of the clips of a split, in the order of the manifest."""
+        return self._splits.get(name, np.empty(0, int))
+
+    @cached_property  # training asks at every iteration
+    def _splits(self) -> dict[str, np.ndarray]:
+        names = self.clips["split"].to_numpy()
+        return {name: np.flatnonzero(names == name) for name in np.unique(names)}
+
+
+def open_dataset(name: str) -> Dataset:
+    """One of the pipeline's data sets; clips that no split names are left with an empty split.
+
+    Raises AnyviewError if the split table does not fit the clips, leaves fewer than two clips to train on, or
+    none to validate with.
+    """
+    folder, table = paths.clip_set(name), paths.split_table(name)
+    store = open_frames(folder)
+    split = read_split(table)
+    unknown = split["clip"][~split["clip"].isin(store.manifest["clip"])]
+    if len(unknown):
+        raise AnyviewError(f"{table}: clip {unknown.iloc[0]} is not in {folder}; run the split stage again")
+    clips = store.manifest.drop(columns=["pair", "split"], errors="ignore")
+    clips = clips.merge(split, on="clip", how="left").fillna({"pair": "", "split": ""})
+    dataset = Dataset(name, store.frames, clips)
+    for wanted, least in (("train", 2), ("validation", 1)):
+        if len(dataset.split(wanted)) < least:
+            raise AnyviewError(f"{table}: split {wanted} needs at least {least} clips")
+    return dataset
+
+
+def dataset_files(name: str) -> list[Path]:
+    """The small files that change whenever a data set does, to key what is made from it."""
+    folder, table = paths.clip_set(name), paths.split_table(name)
+    return [folder / "manifest.csv", folder / "files.csv", table]
+
+
+def clip_pairs(dataset: Dataset, split: str) -> list[tuple[int, int]]:
+    """(source, target) clips to evaluate a translator on: every clip of ``split`` once as the target.
+
+    The source is the other view of the target's pair, or the next clip if it has none. An ``extreme``
+    target's source is a standard validation clip.
+    """
+    targets = dataset.split(split)
+    if split == "extreme":
+        sources = dataset.split("validation")
+        if "kind" in dataset.clips:
+            standard = (dataset.clips["kind"].iloc[sources] == "standard").to_numpy()
+            sources = sources[standard] if standard.any() else sources
+        return [(int(sources[n % len(sources)]), int(target)) for n, target in enumerate(targets)]
+    pairs = dataset.clips["pair"].to_numpy()
+    chosen = []
+    for n, target in enumerate(targets):
+        others = [clip for clip in targets if clip != target and pairs[clip] == pairs[target]]
+        chosen.append((int(others[0] if others else targets[(n + 1) % len(targets)]), int(target)))
+    return chosen

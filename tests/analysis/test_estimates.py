@@ -1,0 +1,126 @@
+"""Intervals against independent calculations."""
+
+import math
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from anyview.analysis.estimates import Estimator, proportion, tidy, without_interval
+from anyview.analysis.statistics import mcnemar_exact, wilson_interval
+
+NORMAL_97_5 = 1.959963984540054
+
+
+@settings(deadline=None)
+@given(st.integers(1, 60).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))))
+def test_wilson_bounds_solve_wilsons_equation(counts):
+    """At a bound p, the observed rate lies exactly 1.96 standard errors (under p) away from p."""
+    successes, trials = counts
+    rate = successes / trials
+    for bound in wilson_interval(successes, trials):
+        error = NORMAL_97_5 * math.sqrt(max(bound * (1 - bound), 0) / trials)
+        assert abs(abs(rate - bound) - error) < 1e-9
+
+
+def test_the_thesis_success_rates_overlap_widely():
+    low, high = wilson_interval(12, 15)
+    assert (round(low, 3), round(high, 3)) == (0.548, 0.930)
+
+
+@settings(deadline=None)
+@given(st.lists(st.tuples(st.booleans(), st.booleans()), min_size=1, max_size=9))
+def test_mcnemar_counts_the_outcomes_at_least_as_rare(pairs):
+    first, second = np.array(pairs).T
+    wins = [a for a, b in pairs if a != b]
+    n = len(wins)
+    rarity = [abs(sum(outcome) - n / 2) for outcome in product([0, 1], repeat=n)]
+    expected = np.mean([rare >= abs(sum(wins) - n / 2) for rare in rarity])
+    assert mcnemar_exact(first, second) == pytest.approx(min(expected, 1.0))
+
+
+def test_twelve_against_seven_of_fifteen_is_not_significant():
+    ours = np.arange(15) < 12
+    other = np.arange(15) < 7
+    assert mcnemar_exact(ours, other) == pytest.approx(2 * 0.5**5)
+
+
+def test_bootstrap_of_a_mean_agrees_with_the_normal_theory():
+    values = np.random.default_rng(0).normal(3, 2, 400)
+    estimate = Estimator(1).mean("x", values)
+    error = NORMAL_97_5 * values.std(ddof=1) / 20
+    assert estimate.value == pytest.approx(values.mean())
+    assert estimate.low == pytest.approx(values.mean() - error, abs=0.1 * error)
+    assert estimate.high == pytest.approx(values.mean() + error, abs=0.1 * error)
+
+
+def test_values_of_one_group_are_one_draw():
+    """Two views that always agree carry the information of one: the interval is wider by sqrt(2)."""
+    values = np.random.default_rng(0).normal(0, 1, 200)
+    alone = Estimator(1).mean("x", values)
+    doubled = Estimator(1).mean("x", np.repeat(values, 2), np.repeat(np.arange(200), 2))
+    naive = Estimator(1).mean("x", np.repeat(values, 2))
+    assert doubled.high - doubled.low == pytest.approx(alone.high - alone.low, rel=0.05)
+    assert naive.high - naive.low == pytest.approx((alone.high - alone.low) / math.sqrt(2), rel=0.05)
+
+
+def test_ratio_of_means_covers_the_true_ratio():
+    rng = np.random.default_rng(0)
+    estimate = Estimator(1).ratio_of_means("x", rng.normal(5.4, 1, 300), rng.normal(2, 0.4, 300))
+    assert estimate.low < 2.7 < estimate.high
+    assert estimate.high - estimate.low < 0.25
+
+
+def test_a_ratio_draws_the_views_of_a_pair_together():
+    """As for a mean: a doubled sample in groups of two says no more than the sample alone."""
+    rng = np.random.default_rng(0)
+    above, below = rng.normal(5.4, 1, 200), rng.normal(2, 0.4, 200)
+    alone = Estimator(1).ratio_of_means("x", above, below)
+    pairs = np.repeat(np.arange(200), 2)
+    doubled = Estimator(1).ratio_of_means("x", np.repeat(above, 2), np.repeat(below, 2), (pairs, pairs))
+    assert doubled.value == pytest.approx(alone.value)
+    assert doubled.high - doubled.low == pytest.approx(alone.high - alone.low, rel=0.05)
+
+
+def test_a_share_keeps_its_pairs():
+    """Where part and whole rise and fall together the share hardly varies; drawn apart it would."""
+    whole = np.random.default_rng(0).normal(10, 3, 100)
+    share, apart = (
+        Estimator(1).share("x", 0.4 * whole, whole),
+        Estimator(1).ratio_of_means("x", 0.4 * whole, whole),
+    )
+    assert share.value == pytest.approx(0.4)
+    assert share.high - share.low < 1e-9 < 0.02 < apart.high - apart.low
+
+
+def test_bounds_repeat_and_depend_on_seed_and_name_alone():
+    values = np.random.default_rng(0).normal(0, 1, 15)
+    assert Estimator(1).median("x", values) == Estimator(1).median("x", values)
+    assert Estimator(1).median("x", values) != Estimator(1).median("y", values)
+    assert Estimator(1).median("x", values) != Estimator(2).median("x", values)
+
+
+def test_a_single_run_has_no_spread():
+    estimate = Estimator(1).median("x", np.array([0.25]))
+    assert estimate.low == estimate.value == estimate.high == 0.25
+    assert proportion(1, 1).low == pytest.approx(0.2065, abs=1e-4)
+
+
+def test_a_tidy_row_has_the_thesis_value_beside_it():
+    rows = [
+        ("ours", "success_rate", proportion(11, 15)),
+        ("real-adam", "validation.loss", without_interval(24_400)),
+        ("tcn", "success_rate", proportion(3, 15)),
+    ]
+    table = tidy(rows).set_index(["cell", "metric"])
+    ours, loss, tcn = (table.loc[row[:2]] for row in rows)
+    assert (ours["thesis"], round(ours["thesis_low"], 3), round(ours["thesis_high"], 3)) == (
+        0.8,
+        0.548,
+        0.930,
+    )
+    assert (loss["value"], loss["thesis"]) == (24_400, 4_232)
+    assert loss[["low", "high", "thesis_low", "thesis_high"]].isna().all()
+    assert np.isnan(tcn["thesis"])

@@ -1,0 +1,63 @@
+"""Which frames are paired with which."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from anyview.training.common.batches import (
+    FramePairs,
+    training_pairs,
+    training_triplets,
+    validation_pairs,
+    validation_triplets,
+)
+
+
+def test_training_pairs_are_two_training_clips_at_one_time(discs):
+    pairs = training_pairs(discs, np.random.default_rng(0), 5000)
+    expert, target = np.split(pairs.frames(discs), 2)
+    context = pairs.contexts(discs)
+    assert (pairs.sources != pairs.targets).all()
+    training = set(discs.split("train"))
+    assert set(pairs.sources) | set(pairs.targets) == training
+    assert set(pairs.times) == set(range(discs.length))
+    for n in range(0, 5000, 500):
+        assert np.array_equal(expert[n], discs.frames[pairs.sources[n], pairs.times[n]])
+        assert np.array_equal(context[n], discs.frames[pairs.targets[n], 0])
+        assert np.array_equal(target[n], discs.frames[pairs.targets[n], pairs.times[n]])
+
+
+@given(length=st.integers(1, 60), count=st.integers(1, 9))
+def test_parts_keep_every_pair_once_and_in_order(length, count):
+    numbers = np.arange(length)
+    parts = FramePairs(numbers, numbers + 1, numbers + 2).parts(count)
+    assert len(parts) == min(count, length)
+    assert np.array_equal(np.concatenate([part.sources for part in parts]), numbers)
+    assert np.array_equal(np.concatenate([part.times for part in parts]), numbers + 2)
+    sizes = [len(part) for part in parts]
+    assert max(sizes) - min(sizes) <= 1
+
+
+def test_validation_frames_are_fixed_and_use_every_clip(discs):
+    first, second = (validation_pairs(discs, np.random.default_rng(5), 20) for _ in range(2))
+    assert np.array_equal(first.times, second.times)
+    assert set(first.targets) == set(discs.split("validation"))
+
+
+def test_triplets_are_two_training_clips_at_the_same_distinct_times(discs):
+    pairs = training_triplets(discs, np.random.default_rng(0), 200, 10)
+    frames = pairs.frames(discs)
+    assert frames.shape == (400, 10, 16, 16, 3)
+    assert (pairs.sources != pairs.targets).all()
+    assert {*pairs.sources.flat, *pairs.targets.flat} <= set(discs.split("train"))
+    assert all(len(set(times)) == 10 for times in pairs.times)
+    for n in (0, 77, 199):
+        for k in (0, 9):
+            assert np.array_equal(frames[n, k], discs.frames[pairs.sources[n, 0], pairs.times[n, k]])
+            assert np.array_equal(frames[200 + n, k], discs.frames[pairs.targets[n, 0], pairs.times[n, k]])
+
+
+def test_validation_triplets_are_whole_clips(discs):
+    pairs = validation_triplets(discs, 3)
+    assert set(pairs.targets.flat) == set(discs.split("validation")[:3])
+    assert np.array_equal(pairs.frames(discs)[3:], discs.frames[pairs.targets[:, 0]])
