@@ -15,6 +15,7 @@ from pathlib import Path
 
 import av
 import cv2
+from av.video.reformatter import VideoReformatter
 
 from anyview.config import load_params
 from anyview.ingest.clips import Candidate, ingest_clip
@@ -29,13 +30,13 @@ def plain_loop(paths: list[Path], folder: Path, size: int) -> None:
     for index, path in enumerate(paths):
         with av.open(str(path)) as source, av.open(str(folder / f"{index}.avi"), "w") as target:
             source.streams.video[0].codec_context.thread_count = 1
+            converter = VideoReformatter()
             stream = target.add_stream("mpeg4", 10)
             stream.width = stream.height = size
             stream.pix_fmt, stream.codec_context.thread_count = "yuv420p", 1
             for frame in source.decode(video=0):
-                small = cv2.resize(
-                    frame.to_ndarray(format="rgb24"), (size, size), interpolation=cv2.INTER_AREA
-                )
+                picture = converter.reformat(frame, format="rgb24", threads=1).to_ndarray()
+                small = cv2.resize(picture, (size, size), interpolation=cv2.INTER_AREA)
                 target.mux(stream.encode(av.VideoFrame.from_ndarray(small, "rgb24")))
             target.mux(stream.encode())
 
