@@ -1,4 +1,4 @@
-"""Ingest against a plain OpenCV read-resize-write loop, over the same surrogate clips in one run.
+"""Ingest against a plain loop of the same library, over the same surrogate clips in one run.
 
     python benchmarks/ingest.py [--clips 48] [--rounds 3]
 
@@ -13,7 +13,9 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import av
 import cv2
+from av.video.reformatter import VideoReformatter
 
 from anyview.config import load_params
 from anyview.ingest.clips import Candidate, ingest_clip
@@ -26,13 +28,17 @@ DEMONSTRATIONS = 4  # filmed once; their clips are listed again until there are 
 def plain_loop(paths: list[Path], folder: Path, size: int) -> None:
     """Read every frame, resize it, write it: no checks, no resampling."""
     for index, path in enumerate(paths):
-        capture = cv2.VideoCapture(str(path))
-        fourcc = cv2.VideoWriter.fourcc(*"XVID")
-        writer = cv2.VideoWriter(str(folder / f"{index}.avi"), fourcc, 10.0, (size, size))
-        while (frame := capture.read()[1]) is not None:
-            writer.write(cv2.resize(frame, (size, size), interpolation=cv2.INTER_AREA))
-        writer.release()
-        capture.release()
+        with av.open(str(path)) as source, av.open(str(folder / f"{index}.avi"), "w") as target:
+            source.streams.video[0].codec_context.thread_count = 1
+            converter = VideoReformatter()
+            stream = target.add_stream("mpeg4", 10)
+            stream.width = stream.height = size
+            stream.pix_fmt, stream.codec_context.thread_count = "yuv420p", 1
+            for frame in source.decode(video=0):
+                picture = converter.reformat(frame, format="rgb24", threads=1).to_ndarray()
+                small = cv2.resize(picture, (size, size), interpolation=cv2.INTER_AREA)
+                target.mux(stream.encode(av.VideoFrame.from_ndarray(small, "rgb24")))
+            target.mux(stream.encode())
 
 
 def main() -> None:

@@ -29,7 +29,7 @@ def main(arguments: list[str]) -> None:
         for verdict in run_tasks(ingest.ingest_clip, tasks):
             verdicts.append(verdict)
             progress.advance()
-    verdicts = ingest.settle(candidates, verdicts)
+    verdicts = ingest.resolve_pairs(candidates, verdicts)
     if all(verdict.reason for verdict in verdicts):
         for candidate, verdict in zip(candidates, verdicts, strict=True):
             print(f"{candidate.file}: {verdict.reason}")

@@ -46,7 +46,7 @@ def run(place: Path, root: Path, stage: str, *arguments: str, under: Callable[[]
 @pytest.fixture
 def place(tmp_path, root) -> Path:
     """A folder in which clips of one's own were ingested and split."""
-    raw = tmp_path / "data" / "real" / "raw"
+    raw = tmp_path / "data" / "raw" / "recorded"
     files = [f"{index:02d}.avi" for index in range(8)]
     for index, file in enumerate(files):
         write_raw(raw / file, pictures(seed=index))
@@ -67,7 +67,7 @@ def test_a_full_disk_is_told_and_harms_nothing(place, root, stage):
 
 
 @pytest.mark.parametrize(
-    ("stage", "folder"), [(["ingest.py"], "data/real"), (["split.py", "real"], "data/splits")]
+    ("stage", "folder"), [(["ingest.py"], "data/clips"), (["split.py", "real"], "data/splits")]
 )
 def test_a_read_only_folder_is_told_and_harms_nothing(place, root, stage, folder):
     before = digests(place / "data")

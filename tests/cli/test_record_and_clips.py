@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from anyview.ingest.judge import read_clip
+from anyview.ingest.normalize import read_clip
 from anyview.video.files import read_video
 from tests.ingest.raw_clips import LIMITS, pictures, write_raw
 

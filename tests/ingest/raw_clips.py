@@ -43,6 +43,14 @@ def write_raw(path: Path, frames: np.ndarray, fps: float = 10.0, codec: str = "X
     return path
 
 
+def shrunk(frame: np.ndarray) -> np.ndarray:
+    """The middle square at 48 x 48: enlarged to a multiple of that, then the mean of each block."""
+    height, width = frame.shape[:2]
+    left = (width - height) // 2
+    square = cv2.resize(frame[:, left : left + height], (48 * 15, 48 * 15), interpolation=cv2.INTER_NEAREST)
+    return square.reshape(48, 15, 48, 15, 3).mean(axis=(1, 3))
+
+
 def damaged(content: bytes, count: int, seed: int) -> Iterator[tuple[str, bytes]]:
     """``count`` damaged versions of a file, each with what was done to it ("renamed": to you)."""
     rng = stream(seed, "damage")
@@ -93,6 +101,6 @@ def candidate(file: str, pair: str = "", kind: str = "standard") -> Candidate:
     return Candidate(Path(file).stem, file, pair or Path(file).stem, "", kind)
 
 
-def judge(source: Path, file: str, folder: Path, limits=LIMITS) -> str:
+def refusal(source: Path, file: str, folder: Path, limits=LIMITS) -> str:
     folder.mkdir(exist_ok=True)
     return ingest_clip(source, folder, candidate(file), limits).reason

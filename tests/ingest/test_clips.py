@@ -1,4 +1,4 @@
-"""Ingest: a folder of raw clips becomes a set; every clip is judged, none stops the others."""
+"""Ingest: a folder of raw clips becomes a set; each gets its verdict, none stops the others."""
 
 import os
 import shutil
@@ -12,12 +12,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from anyview.ingest.clips import Candidate, Verdict, ingest_clip, publish, read_candidates, settle
-from anyview.ingest.judge import read_clip
+from anyview.ingest.clips import Candidate, Verdict, ingest_clip, publish, read_candidates, resolve_pairs
+from anyview.ingest.normalize import read_clip
 from anyview.runtime.errors import AnyviewError
 from anyview.video.files import read_video
 from anyview.video.manifests import propose_manifest
-from tests.ingest.raw_clips import LIMITS, candidate, judge, pictures, write_raw
+from tests.ingest.raw_clips import LIMITS, candidate, pictures, refusal, write_raw
 
 
 def test_duplicates_and_halves_of_pairs_are_refused_but_singles_are_not():
@@ -25,7 +25,7 @@ def test_duplicates_and_halves_of_pairs_are_refused_but_singles_are_not():
     candidates += [candidate("d.avi", "3"), candidate("e.avi", "3"), candidate("f.avi")]
     verdicts = [Verdict("", {}, "A"), Verdict("damaged: cut short"), Verdict("", {}, "C")]
     verdicts += [Verdict("", {}, "D"), Verdict("", {}, "C"), Verdict("", {}, "F")]
-    assert [verdict.reason for verdict in settle(candidates, verdicts)] == [
+    assert [verdict.reason for verdict in resolve_pairs(candidates, verdicts)] == [
         "the other view of its pair was refused",
         "damaged: cut short",
         "",
@@ -44,7 +44,7 @@ def test_a_pair_of_which_one_view_alone_is_extreme_is_refused_and_stops_nothing(
             ("c", "2", "standard"),
         )
     ]
-    verdicts = settle(candidates, [Verdict("", {}, name) for name in "abc"])
+    verdicts = resolve_pairs(candidates, [Verdict("", {}, name) for name in "abc"])
     assert [verdict.reason for verdict in verdicts] == [
         *["only one view of its pair is called extreme_distractor"] * 2,
         "",
@@ -97,15 +97,15 @@ def test_any_names_give_ids_that_are_unique_plain_file_names(tmp_path_factory, f
 def test_an_earlier_result_counts_only_while_clip_and_result_are_unchanged(tmp_path):
     work = tmp_path / "work"
     write_raw(tmp_path / "clip.avi", pictures())
-    assert judge(tmp_path, "clip.avi", work) == ""
+    assert refusal(tmp_path, "clip.avi", work) == ""
     made = (work / "clip.avi").stat().st_mtime_ns
-    assert judge(tmp_path, "clip.avi", work) == ""
+    assert refusal(tmp_path, "clip.avi", work) == ""
     assert (work / "clip.avi").stat().st_mtime_ns == made
     (work / "clip.avi").write_bytes(b"half")
-    assert judge(tmp_path, "clip.avi", work) == ""
+    assert refusal(tmp_path, "clip.avi", work) == ""
     assert read_video(work / "clip.avi").shape == (80, 48, 48, 3)
     write_raw(tmp_path / "clip.avi", pictures()[:50])
-    assert "are needed" in judge(tmp_path, "clip.avi", work)
+    assert "are needed" in refusal(tmp_path, "clip.avi", work)
 
 
 def test_published_clips_open_as_a_set(tmp_path):
@@ -115,7 +115,7 @@ def test_published_clips_open_as_a_set(tmp_path):
         write_raw(tmp_path / name, pictures(seed=seed))
     candidates = [candidate("b.avi", "1"), candidate("gone.avi"), candidate("a.avi", "2", "distractor")]
     (work := tmp_path / "work").mkdir()
-    verdicts = settle(candidates, [ingest_clip(tmp_path, work, c, LIMITS) for c in candidates])
+    verdicts = resolve_pairs(candidates, [ingest_clip(tmp_path, work, c, LIMITS) for c in candidates])
     (out := tmp_path / "out").mkdir()
     assert publish(out, work, candidates, verdicts) == (2, 1)
     store = open_frames(out)
@@ -130,7 +130,7 @@ def test_published_clips_open_as_a_set(tmp_path):
 
 
 def test_the_stage_takes_a_mixed_folder_and_one_bad_clip_stops_nothing(tmp_path, root):
-    raw = tmp_path / "data" / "real" / "raw"
+    raw = tmp_path / "data" / "raw" / "recorded"
     rows = []
     kinds = ((".mp4", "mp4v", 30.0), (".mov", "mp4v", 25.0), (".mkv", "XVID", 12.0), (".avi", "MJPG", 10.0))
     for index, (suffix, codec, fps) in enumerate(kinds):
@@ -145,7 +145,7 @@ def test_the_stage_takes_a_mixed_folder_and_one_bad_clip_stops_nothing(tmp_path,
     (tmp_path / "params.yaml").write_text(params)
     outputs = []
     for workers in ("1", "2"):
-        shutil.rmtree(tmp_path / "data" / "real" / "clips", ignore_errors=True)
+        shutil.rmtree(tmp_path / "data" / "clips" / "real", ignore_errors=True)
         for stage in (["ingest.py"], ["split.py", "real"]):
             done = subprocess.run(
                 [sys.executable, str(root / "stages" / stage[0]), *stage[1:]],
@@ -157,7 +157,7 @@ def test_the_stage_takes_a_mixed_folder_and_one_bad_clip_stops_nothing(tmp_path,
             )
             assert done.returncode == 0, done.stderr
             assert done.stderr == ""
-        files = sorted((tmp_path / "data" / "real" / "clips").iterdir())
+        files = sorted((tmp_path / "data" / "clips" / "real").iterdir())
         outputs.append({path.name: path.read_bytes() for path in files})
     assert outputs[0] == outputs[1]
     assert pd.read_csv(tmp_path / "data/clips/real/refused.csv")["file"].tolist() == ["bad.avi"]

@@ -19,7 +19,7 @@ CLIPS = 24
 @pytest.fixture
 def place(tmp_path, root) -> Path:
     """A folder to run stages in, with raw clips of one's own."""
-    raw = tmp_path / "data" / "real" / "raw"
+    raw = tmp_path / "data" / "raw" / "recorded"
     files = [f"{index:02d}.avi" for index in range(CLIPS)]
     for index, file in enumerate(files):
         write_raw(raw / file, pictures(seed=index))

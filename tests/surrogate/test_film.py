@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from anyview.config import Ingest
-from anyview.ingest.judge import read_clip
+from anyview.ingest.normalize import read_clip
 from anyview.seeds import stream
 from anyview.surrogate.film import film, plan
 from anyview.surrogate.push import CUP_DEPTH, CUP_HALF_WIDTH, OBJECT_RADIUS, STEP, sample_push

@@ -103,12 +103,12 @@ def test_a_simulated_set_is_split_by_a_fraction_or_a_count(tmp_path, root, held_
     folder.mkdir(parents=True)
     pd.DataFrame({"clip": [f"c{index}" for index in range(20)]}).to_csv(folder / "manifest.csv", index=False)
     shutil.copy(root / "params.yaml", tmp_path)
-    change(tmp_path, {"split.sim.validation": held_out})
+    change(tmp_path, {"split.diverse.validation": held_out})
     command = [sys.executable, str(root / "stages/split.py"), "diverse"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     if expected is None:
         assert (done.returncode, "Traceback" in done.stderr) == (2, False)
-        assert "split.sim.validation: 20, but diverse has 20 clips" in done.stderr
+        assert "split.diverse.validation: 20, but diverse has 20 clips" in done.stderr
     else:
         counts = read_split(tmp_path / "data/splits/diverse.csv")["split"].value_counts()
         assert dict(counts) == {"train": 20 - expected, "validation": expected}

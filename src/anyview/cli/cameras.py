@@ -3,8 +3,8 @@
 import math
 import threading
 import time
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Generator, Sequence
+from contextlib import ExitStack, closing
 from itertools import count
 from pathlib import Path
 
@@ -15,9 +15,9 @@ import pandas as pd
 from anyview.ingest.raw_manifest import read_raw_manifest
 from anyview.runtime.errors import AnyviewError
 from anyview.runtime.outputs import write_atomically
-from anyview.video.ffmpeg import listening
-from anyview.video.files import VideoWriter, open_capture
+from anyview.video.files import VideoWriter
 from anyview.video.manifests import KINDS, RAW_COLUMNS, times_file
+from anyview.video.reading import open_video
 
 RATE = 10.0  # frames a second that are kept
 PATIENCE = 2.0  # seconds without a frame before a camera counts as unplugged
@@ -42,21 +42,15 @@ class Camera:
     def __init__(self, name: str, source: str):
         """Raises AnyviewError when the source cannot be opened or gives no frame."""
         self.name, self.source = name, source
-        self._stack = ExitStack()
         self._rolling = threading.Event()
         self._stopping = threading.Event()
         self._changed = threading.Condition()
         self._ended = False
-        self._device = _device_number(name, source)
-        if self._device is not None:
-            self._stack.enter_context(listening())  # OpenCV's warnings would spoil the display
-            self._capture = _open_device(self._device)
-            self._stack.callback(self._capture.release)
-        else:
-            self._capture, _ = self._stack.enter_context(open_capture(Path(source)))
-        picture = self._capture.read()[1] if self._capture.isOpened() else None
+        device = _device_number(name, source)
+        self._is_file = device is None
+        self._pictures = _filmed(device) if device is not None else self._played(Path(source))
+        picture = next(self._pictures, None)
         if picture is None:
-            self._stack.close()
             raise AnyviewError(f"camera {name}: {source} gives no picture; is it plugged in and free?")
         self._newest = (picture, time.monotonic())
         self._thread = threading.Thread(target=self._watch, daemon=True)
@@ -66,16 +60,14 @@ class Camera:
         """The newest frame, uint8 RGB with even sides, and the ``time.monotonic`` at which it came."""
         picture, taken = self._newest
         height, width = picture.shape[:2]
-        return cv2.cvtColor(picture[: height // 2 * 2, : width // 2 * 2], cv2.COLOR_BGR2RGB), taken
+        return picture[: height // 2 * 2, : width // 2 * 2], taken
 
     def wait(self, after: float) -> None:
         """Wait for a frame newer than ``after``; raises AnyviewError when none comes."""
         with self._changed:
             self._changed.wait_for(lambda: self._newest[1] > after or self._ended, PATIENCE)
         if self._newest[1] <= after:
-            reason = (
-                "the file ends too early" if self._device is None else "no frame comes; was it unplugged?"
-            )
+            reason = "the file ends too early" if self._is_file else "no frame comes; was it unplugged?"
             raise AnyviewError(f"camera {self.name}: {reason}")
 
     def roll(self) -> None:
@@ -87,39 +79,46 @@ class Camera:
         self._stopping.set()
         self._rolling.set()
         self._thread.join()
-        self._stack.close()
 
     def _watch(self) -> None:
-        file = self._device is None
-        if file:
-            self._rolling.wait()
-            self._show(self._newest[0])
-        began = time.monotonic()
-        while not self._stopping.is_set():
-            picture = self._capture.read()[1]
-            if picture is not None and file:
-                due = began + self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1e3
-                self._stopping.wait(max(due - time.monotonic(), 0.0))
-            self._show(picture)
-            if picture is None:
-                return
-
-    def _show(self, picture: np.ndarray | None) -> None:
+        with closing(self._pictures):
+            for picture in self._pictures:
+                if self._stopping.is_set():
+                    return
+                with self._changed:
+                    self._newest = (picture, time.monotonic())
+                    self._changed.notify_all()
         with self._changed:
-            if picture is None:
-                self._ended = True
-            else:
-                self._newest = (picture, time.monotonic())
+            self._ended = True
             self._changed.notify_all()
 
+    def _played(self, path: Path) -> Generator[np.ndarray, None, None]:
+        """The pictures of a file, the first one again at ``roll`` and each later one when it is due."""
+        with open_video(path) as video:
+            began = 0.0
+            for frame in video.frames():
+                picture = video.rgb(frame)
+                if not began:
+                    yield picture
+                    self._rolling.wait()
+                    began = time.monotonic()
+                self._stopping.wait(max(began + frame.time - time.monotonic(), 0.0))
+                yield picture
 
-def _open_device(index: int) -> cv2.VideoCapture:
-    capture = cv2.VideoCapture(index)
+
+def _filmed(device: int) -> Generator[np.ndarray, None, None]:
+    """The pictures of a camera device as they come."""
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # warnings would spoil the display
+    capture = cv2.VideoCapture(device)
     # Compressed pictures, so that two cameras fit on one USB bus.
     capture.set(cv2.CAP_PROP_FOURCC, cv2.VideoWriter.fourcc(*"MJPG"))
     capture.set(cv2.CAP_PROP_FRAME_WIDTH, _WISHED_SIZE[0])
     capture.set(cv2.CAP_PROP_FRAME_HEIGHT, _WISHED_SIZE[1])
-    return capture
+    try:
+        while (picture := capture.read()[1]) is not None:
+            yield cv2.cvtColor(picture, cv2.COLOR_BGR2RGB)
+    finally:
+        capture.release()
 
 
 def free_pair(folder: Path) -> str:

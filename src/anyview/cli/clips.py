@@ -10,11 +10,20 @@ import typer
 from anyview import paths
 from anyview.runtime.errors import AnyviewError
 
+RAW = paths.raw("recorded")
+
 
 def clips(
     sheet: Annotated[
         Path | None, typer.Option("--sheet", metavar="PNG", help="Also write a contact sheet of the clips.")
     ] = None,
+    propose: Annotated[
+        bool,
+        typer.Option(
+            "--propose", help="Propose a manifest for the raw clips, with start and end by their motion."
+        ),
+    ] = False,
+    raw: Annotated[Path, typer.Option("--raw", metavar="FOLDER", help="The raw clips to propose for.")] = RAW,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON for a script.")] = False,
 ) -> None:
     """List the clips that there are, by kind, split and source, and the refused with the reason."""
@@ -23,12 +32,30 @@ def clips(
 
     if sheet is not None and sheet.suffix.lower() != ".png":
         raise AnyviewError(f"{sheet}: a contact sheet is a .png file")
+    if propose:
+        _propose(raw, as_json)
+        return
     params = load_params()
     found = survey(ingested_source() or params.real.source, params.split)
     print(json.dumps(found, indent=2) if as_json else "\n".join(lines(found)))
     if sheet is not None:
         _write_sheet(sheet)
         print(f"contact sheet: {sheet}", file=sys.stderr if as_json else sys.stdout)
+
+
+def _propose(folder: Path, as_json: bool) -> None:
+    from anyview.cli.proposal import propose
+    from anyview.config import load_params
+
+    table, reasons = propose(folder, load_params().real.ingest)
+    rows = [row | {"reason": reasons.get(row["file"], "")} for row in table.to_dict("records")]
+    if as_json:
+        print(json.dumps({"manifest": str(folder / "manifest.proposed.csv"), "clips": rows}, indent=2))
+        return
+    for row in rows:
+        print(f"{row['file']}: {row['reason'] or '{start} to {end} s'.format(**row)}")
+    print(f"check {folder / 'manifest.proposed.csv'} by the pictures in {folder / 'manifest.proposed.png'};")
+    print("then rename it to manifest.csv")
 
 
 def _write_sheet(path: Path) -> None:

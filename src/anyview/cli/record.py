@@ -106,7 +106,7 @@ def _film(
 def _compare_with_ingest(seconds: float) -> None:
     """Say so where stage `ingest` would refuse a clip of this length."""
     from anyview.config import load_params
-    from anyview.ingest.judge import LONGEST
+    from anyview.ingest.normalize import LONGEST
 
     if not Path("params.yaml").is_file():
         return

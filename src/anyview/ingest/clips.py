@@ -1,4 +1,4 @@
-"""Raw clips into short, small, even ones: every clip is judged, and none stops the others."""
+"""Raw clips into short, small, even ones: each gets its verdict, and none stops the others."""
 
 import hashlib
 import re
@@ -12,26 +12,32 @@ from typing import Any
 import pandas as pd
 
 from anyview.config import Ingest
-from anyview.ingest.judge import Refused, read_clip
+from anyview.ingest.normalize import Refused, parse_stretch, read_clip
 from anyview.ingest.raw_manifest import read_raw_manifest
 from anyview.runtime.errors import AnyviewError
 from anyview.runtime.once import once, sha256
 from anyview.runtime.outputs import write_atomically
-from anyview.video.manifests import KINDS, propose_manifest, times_file
+from anyview.video.manifests import KINDS, RAW_COLUMNS, propose_manifest, times_file
 from anyview.video.sets import StoredFile, write_clips, write_set
 
 EXTREME = KINDS[-1]  # clips of scenes that training never sees
+_COLUMNS = ("clip", *RAW_COLUMNS)  # of a finished set's manifest
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A row of a raw manifest; ``clip`` is the id that the finished clip will have."""
+    """A row of a raw manifest; ``clip`` is the id that the finished clip will have.
+
+    ``start`` and ``end`` are as the manifest has them: seconds, or both empty.
+    """
 
     clip: str
     file: str
     pair: str
     camera: str
     kind: str
+    start: str = ""
+    end: str = ""
 
 
 @dataclass(frozen=True)
@@ -59,14 +65,20 @@ def read_candidates(source: Path) -> list[Candidate]:
         if proposal.empty:
             raise AnyviewError(f"{source}: no video files; fill it with `anyview record` or your own clips")
         write_atomically(source / "manifest.proposed.csv", proposal.to_csv(index=False))
-        raise AnyviewError(f"{path}: no such file; check manifest.proposed.csv beside it and rename it")
+        raise AnyviewError(
+            f"{path}: no such file; check manifest.proposed.csv beside it and rename it "
+            "(`anyview clips --propose` also finds where the demonstrations are)"
+        )
     candidates: list[Candidate] = []
     taken: Counter[str] = Counter()
     for row in read_raw_manifest(path).to_dict("records"):
         stem = _slug(row["file"])
         taken[stem.lower()] += 1
         clip = stem if taken[stem.lower()] == 1 else f"{stem}~{taken[stem.lower()]}"
-        candidates.append(Candidate(clip, row["file"], row["pair"] or clip, row["camera"], row["kind"]))
+        stretch = row.get("start", ""), row.get("end", "")
+        candidates.append(
+            Candidate(clip, row["file"], row["pair"] or clip, row["camera"], row["kind"], *stretch)
+        )
     if not candidates:
         raise AnyviewError(f"{path}: it lists no clips")
     return candidates
@@ -79,12 +91,13 @@ def _slug(file: str) -> str:
 
 
 def ingest_clip(source: Path, folder: Path, candidate: Candidate, limits: Ingest) -> Verdict:
-    """Judge one raw clip and write the finished one to ``folder``, unless an earlier try did.
+    """Normalise one raw clip and write the finished one to ``folder``, unless an earlier try did.
 
     ``folder`` is scratch space keyed by the limits and the code (see ``runtime.once``).
     """
     try:
         path = _locate(source, candidate)
+        stretch = parse_stretch(candidate.start, candidate.end)
         if path.stat().st_size > limits.max_megabytes * 1e6:
             raise Refused(f"larger than {limits.max_megabytes:g} MB")
         content = sha256(path)
@@ -96,7 +109,7 @@ def ingest_clip(source: Path, folder: Path, candidate: Candidate, limits: Ingest
 
     def make() -> tuple[dict[str, Any], list[str]]:
         try:
-            frames = read_clip(path, limits)
+            frames = read_clip(path, limits, stretch)
         except Refused as refusal:
             return asdict(Verdict(str(refusal))), []
         stored = write_clips(folder / f"{candidate.clip}.avi", frames[None], limits.rate, "XVID")
@@ -104,7 +117,7 @@ def ingest_clip(source: Path, folder: Path, candidate: Candidate, limits: Ingest
             stored.file
         ]
 
-    name = hashlib.sha256(f"{candidate.clip}/{content}".encode()).hexdigest()[:32]
+    name = hashlib.sha256(f"{candidate.clip}/{content}/{stretch}".encode()).hexdigest()[:32]
     return Verdict(**once(folder, name, make))
 
 
@@ -127,7 +140,7 @@ def _locate(source: Path, candidate: Candidate) -> Path:
     return path
 
 
-def settle(candidates: Sequence[Candidate], verdicts: Sequence[Verdict]) -> list[Verdict]:
+def resolve_pairs(candidates: Sequence[Candidate], verdicts: Sequence[Verdict]) -> list[Verdict]:
     """The final verdicts: duplicates of earlier clips are refused, pairs of which one view alone is extreme,
     and views whose pair lost its other one.
 
@@ -137,21 +150,21 @@ def settle(candidates: Sequence[Candidate], verdicts: Sequence[Verdict]) -> list
     extreme: dict[str, set[bool]] = {}
     for candidate in candidates:
         extreme.setdefault(candidate.pair, set()).add(candidate.kind == EXTREME)
-    settled = []
+    resolved = []
     for candidate, verdict in zip(candidates, verdicts, strict=True):
         if not verdict.reason and verdict.pictures in first:
             verdict = Verdict(f"a duplicate of {first[verdict.pictures]}")
         elif not verdict.reason and len(extreme[candidate.pair]) > 1:
             verdict = Verdict(f"only one view of its pair is called {EXTREME}")
         first.setdefault(verdict.pictures, candidate.file)
-        settled.append(verdict)
+        resolved.append(verdict)
     declared = Counter(candidate.pair for candidate in candidates)
-    left = Counter(c.pair for c, verdict in zip(candidates, settled, strict=True) if not verdict.reason)
+    left = Counter(c.pair for c, verdict in zip(candidates, resolved, strict=True) if not verdict.reason)
     return [
         Verdict("the other view of its pair was refused")
         if not verdict.reason and declared[candidate.pair] > 1 == left[candidate.pair]
         else verdict
-        for candidate, verdict in zip(candidates, settled, strict=True)
+        for candidate, verdict in zip(candidates, resolved, strict=True)
     ]
 
 
@@ -168,9 +181,9 @@ def publish(
             refused.append((candidate.file, verdict.reason))
             continue
         files.append(StoredFile(**verdict.stored))
-        rows.append(asdict(candidate) | {"file": files[-1].file})
+        rows.append({key: getattr(candidate, key) for key in _COLUMNS} | {"file": files[-1].file})
         shutil.copyfile(folder / files[-1].file, output / files[-1].file)
-    write_set(output, pd.DataFrame(rows, columns=list(Candidate.__dataclass_fields__)), files)
+    write_set(output, pd.DataFrame(rows, columns=list(_COLUMNS)), files)
     write_atomically(
         output / "refused.csv", pd.DataFrame(refused, columns=["file", "reason"]).to_csv(index=False)
     )

@@ -10,6 +10,7 @@ from anyview.runtime.errors import AnyviewError
 
 KINDS = ("standard", "distractor", "extreme_view", "extreme_distractor")
 RAW_COLUMNS = ("file", "pair", "camera", "kind")
+STRETCH_COLUMNS = ("start", "end")  # a raw manifest may have them
 VIDEO_SUFFIXES = frozenset(
     (
         ".avi",
@@ -29,6 +30,7 @@ VIDEO_SUFFIXES = frozenset(
         ".asf",
         ".ogv",
         ".3gp",
+        ".dv",
     )
 )
 

@@ -12,17 +12,9 @@ import pandas as pd
 import pytest
 
 from anyview.ingest.clips import ingest_clip
-from anyview.ingest.judge import Refused, read_clip
+from anyview.ingest.normalize import Refused, read_clip
 from anyview.video.files import read_video
-from tests.ingest.raw_clips import LIMITS, candidate, damaged, judge, pictures, write_raw
-
-
-def shrunk(frame: np.ndarray) -> np.ndarray:
-    """The middle square at 48 x 48: enlarged to a multiple of that, then the mean of each block."""
-    height, width = frame.shape[:2]
-    left = (width - height) // 2
-    square = cv2.resize(frame[:, left : left + height], (48 * 15, 48 * 15), interpolation=cv2.INTER_NEAREST)
-    return square.reshape(48, 15, 48, 15, 3).mean(axis=(1, 3))
+from tests.ingest.raw_clips import LIMITS, candidate, damaged, pictures, refusal, shrunk, write_raw
 
 
 @pytest.mark.parametrize(
@@ -188,14 +180,14 @@ def test_paths_that_leave_the_folder_or_are_no_clips_are_refused(tmp_path):
         "http://127.0.0.1:9/x.avi": "no such file",
     }
     for file, reason in reasons.items():
-        assert re.search(reason, judge(raw, file, work)), file
+        assert re.search(reason, refusal(raw, file, work)), file
     assert "kind 'odd'" in ingest_clip(raw, work, candidate("text.avi", kind="odd"), LIMITS).reason
 
 
 def test_a_file_above_the_stated_size_is_refused(tmp_path):
     path = write_raw(tmp_path / "clip.avi", pictures())
     small = LIMITS.model_copy(update={"max_megabytes": path.stat().st_size / 1e6 - 0.001})
-    assert judge(tmp_path, "clip.avi", tmp_path / "work", small).startswith("larger than")
+    assert refusal(tmp_path, "clip.avi", tmp_path / "work", small).startswith("larger than")
 
 
 @pytest.mark.parametrize(
@@ -211,7 +203,7 @@ def test_a_header_that_claims_a_giant_picture_is_refused(tmp_path, name, codec, 
     content = path.read_bytes()
     assert sides in content
     path.write_bytes(content.replace(sides, claimed))
-    assert "claims a picture of" in judge(tmp_path, name, tmp_path / "work")
+    assert "claims a picture of" in refusal(tmp_path, name, tmp_path / "work")
 
 
 @pytest.mark.parametrize("side", [3000, 60_000])
@@ -221,12 +213,12 @@ def test_a_frame_that_claims_a_giant_picture_is_refused_without_the_memory(tmp_p
     claimed = start + side.to_bytes(2, "big") * 2
     path.write_bytes(path.read_bytes().replace(start + b"\0\x5a\0\xa0", claimed))
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    assert "damaged" in judge(tmp_path, "clip.avi", tmp_path / "work")
+    assert "damaged" in refusal(tmp_path, "clip.avi", tmp_path / "work")
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 200_000  # kilobytes
 
 
 def test_a_clip_that_takes_forever_to_decode_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("anyview.ingest.judge.PATIENCE", 0.0)
+    monkeypatch.setattr("anyview.ingest.normalize.PATIENCE", 0.0)
     with pytest.raises(Refused, match="to decode"):
         read_clip(write_raw(tmp_path / "clip.avi", pictures()), LIMITS)
 
@@ -234,7 +226,7 @@ def test_a_clip_that_takes_forever_to_decode_is_refused(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("name", "codec", "count"), [("clip.avi", "XVID", 80), ("clip.mp4", "mp4v", 60), ("clip.mkv", "XVID", 60)]
 )
-def test_two_hundred_damaged_clips_are_judged(tmp_path, name, codec, count):
+def test_of_two_hundred_damaged_clips_only_sound_ones_pass(tmp_path, name, codec, count):
     """Structural damage is refused; what is accepted has 80 frames that decode and change."""
     content = write_raw(tmp_path / name, pictures(), codec=codec).read_bytes()
     accepted = 0
@@ -243,7 +235,7 @@ def test_two_hundred_damaged_clips_are_judged(tmp_path, name, codec, count):
         suffix = Path(name).suffix
         file = f"{index:03d}{renamed[suffix] if way == 'renamed' else suffix}"
         (tmp_path / file).write_bytes(altered)
-        reason = judge(tmp_path, file, tmp_path / "work")
+        reason = refusal(tmp_path, file, tmp_path / "work")
         if way in ("cut", "emptied", "other"):
             assert reason, f"{way} {index} was accepted"
         if not reason:
@@ -270,7 +262,7 @@ def nested(name: str) -> bytes:
 @pytest.mark.parametrize("name", ["clip.mp4", "clip.avi"])
 def test_endless_nesting_is_refused(tmp_path, name):
     (tmp_path / name).write_bytes(nested(name))
-    assert judge(tmp_path, name, tmp_path / "out") == "damaged: nested too deeply"
+    assert refusal(tmp_path, name, tmp_path / "out") == "damaged: nested too deeply"
 
 
 def test_a_table_of_more_parts_than_a_clip_can_have_is_refused_unread(tmp_path):
@@ -292,17 +284,17 @@ def test_a_giant_sidecar_is_refused_unread(tmp_path):
 def test_a_sidecar_of_giant_numbers_is_refused(tmp_path):
     write_raw(tmp_path / "clip.avi", pictures())
     (tmp_path / "clip.times.csv").write_text("seconds\n" + "9" * 400 + "\n" + "9" * 401 + "\n")
-    assert "clip.times.csv: " in judge(tmp_path, "clip.avi", tmp_path / "out")
+    assert "clip.times.csv: " in refusal(tmp_path, "clip.avi", tmp_path / "out")
 
 
 def test_a_clip_that_mostly_stands_still_is_refused(tmp_path):
     write_raw(tmp_path / "clip.avi", np.repeat(pictures()[::8], 8, axis=0), codec="FFV1")
-    assert judge(tmp_path, "clip.avi", tmp_path / "out").startswith("frozen: ")
+    assert refusal(tmp_path, "clip.avi", tmp_path / "out").startswith("frozen: ")
 
 
 def test_a_transport_stream_that_was_cut_is_refused(tmp_path):
     path = write_raw(tmp_path / "clip.ts", pictures(100), codec="mp4v")
-    assert judge(tmp_path, "clip.ts", tmp_path / "whole") == ""
+    assert refusal(tmp_path, "clip.ts", tmp_path / "whole") == ""
     content = path.read_bytes()
     path.write_bytes(content[: len(content) * 19 // 20 // 188 * 188 + 1])
-    assert judge(tmp_path, "clip.ts", tmp_path / "out") == "damaged: cut short"
+    assert refusal(tmp_path, "clip.ts", tmp_path / "out") == "damaged: cut short"
