@@ -193,7 +193,7 @@ def floors(params: Params) -> dict[str, float]:
         for layer, (before, after) in enumerate(pairwise(channels))
     )
     ddpg = params.imitation.ddpg
-    widths = [OBSERVATION_SIZE + ACTION_SIZE + ddpg.time_bumps, *ddpg.hidden, 1]
+    widths = [OBSERVATION_SIZE + ACTION_SIZE + ddpg.time_features, *ddpg.hidden, 1]
     network = 2 * sum(a * b for a, b in pairwise(widths))
     row = 4 * (2 * OBSERVATION_SIZE + ACTION_SIZE + 2)
     pushers = mujoco.batch.Batch(model("twist"), nsim=8, nthread=1)
@@ -212,7 +212,7 @@ def floors(params: Params) -> dict[str, float]:
 def main() -> None:
     """Print the comparison and the breakdown."""
     params, cores = load_params(), len(os.sched_getaffinity(0))
-    ddpg = params.imitation.ddpg.model_copy(update={"time_bumps": 0, "warmup_episodes": 1})
+    ddpg = params.imitation.ddpg.model_copy(update={"time_features": 0, "warmup_episodes": 1})
     imitation = params.imitation.model_copy(update={"ddpg": ddpg, "episodes_per_iteration": 1})
     params = params.model_copy(update={"imitation": imitation})
     contexts, _ = sample_contexts(np.random.default_rng(0), RUNS)

@@ -200,8 +200,8 @@ class DDPG(Block):
     recent_episodes: Count = Field(description="half of each batch comes from this many newest episodes")
     warmup_episodes: CountOrNone = Field(description="episodes of noise alone before updates start")
     n_step: Annotated[int, Field(ge=1, le=49)] = Field(description="rewards summed before bootstrapping")
-    time_bumps: CountOrNone = Field(
-        description="Gaussian bumps over the episode that show the networks the time"
+    time_features: CountOrNone = Field(
+        description="radial basis functions of time beside the observation; 0 leaves them out"
     )
     noise: Positive = Field(description="Ornstein-Uhlenbeck deviation at first, in units of the action range")
     noise_end: Positive = Field(description="the same at the end; it falls geometrically")

@@ -121,7 +121,7 @@ class DDPG:
         self._params, self._seed, self._runs = params, seed, list(runs)
         self._action_size, self._horizon, self._copies = action_size, horizon, copies
         self._iterations, self._device = iterations, device
-        inputs = observation_size + params.time_bumps
+        inputs = observation_size + params.time_features
         weights = [stream(seed, "policy", run) for run in self._runs]
         self._policy = StackedMLP.initial([inputs, *params.hidden, action_size], weights, device)
         self._critic = StackedMLP.initial([inputs + action_size, *params.hidden, 1], weights, device)
@@ -146,7 +146,7 @@ class DDPG:
         return torch.from_numpy(np.asarray(array, np.float32)).to(self._device)
 
     def _input(self, observations: Tensor) -> Tensor:
-        return with_time_features(observations, self._params.time_bumps)
+        return with_time_features(observations, self._params.time_features)
 
     @torch.no_grad()
     def act(self, observations: np.ndarray, explore: bool) -> np.ndarray:
