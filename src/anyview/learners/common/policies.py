@@ -108,9 +108,7 @@ def _read_description(path: Path) -> dict[str, Any]:
     try:
         values = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
-        raise AnyviewError(
-            f"{path}: no such file; run `dvc repro imitate@{path.parent.name}` first"
-        ) from None
+        raise AnyviewError(f"{path}: no such file; evaluate the method by `dvc repro` first") from None
     except (ValueError, RecursionError) as error:
         raise AnyviewError(f"{path}: not valid JSON: {error}") from None
     keys = {"learner": str, "control": str, "image_size": int, "contexts": list}
