@@ -2,7 +2,7 @@
 
     python benchmarks/translator.py [compact real ...] [--rounds 5]      speed and share of the peak
     python benchmarks/translator.py --curves 120 [compact]               loss curves of both, three seeds
-    python benchmarks/translator.py --data data/sim/diverse              decoding and memory of a set of clips
+    python benchmarks/translator.py --data data/clips/diverse            decoding and memory of a set of clips
 
 The plain loop is eager float32: every encoder is called separately, skips are concatenated, the optimiser is
 PyTorch's default and every operation runs on all cores. Both have the same frames in memory, the same weights

@@ -111,6 +111,6 @@ def test_results_travel_through_an_s3_bucket(study, tmp_path, bucket):
     study.run("dvc", "push", "--with-deps", "imitate@ours")
     other = clone(study, tmp_path / "clone")
     other.run("dvc", "pull", "--with-deps", "imitate@ours")
-    for folder in ("sim/diverse", "models/sim", "policies/ours"):
+    for folder in ("clips/diverse", "models/sim", "policies/ours"):
         assert digests(other.folder / "data" / folder) == digests(study.folder / "data" / folder) != {}
     assert "up to date" in other.run("dvc", "repro", "imitate@ours")
