@@ -378,7 +378,8 @@ def _refuse_twins(params: Params, name: str) -> None:
     for block, key, other, taken in (
         ("embeddings", params.embeddings, "translators", params.translators),
         ("adversarial.cells", params.adversarial.cells, "imitation.cells", params.imitation.cells),
-        ("simulate.sets", params.simulate.sets, "the clips of another stage", [REAL, RENDERED]),
+        ("simulate.sets", params.simulate.sets, "the clips that stage ingest makes", [REAL]),
+        ("simulate.sets", params.simulate.sets, "the clips that stage render makes", [RENDERED]),
     ):
         for cell in key:
             if cell in taken:

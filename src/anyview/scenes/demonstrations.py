@@ -17,7 +17,7 @@ from anyview.trigonometry import unit_vector
 VIEWS = ("left", "right")
 DURATION = 8.0  # seconds that a clip lasts
 
-_SUPERSAMPLING = 4
+SUPERSAMPLING = 4
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ def render_demonstration(rng: np.random.Generator, moments: int, size: int) -> D
     standing += sample_things(rng, push)
     tones = (table, looks.table_colour(rng), looks.colour(rng))
     pictures = [looks.texture(rng, tone) for tone in tones]
-    drawn = _SUPERSAMPLING * size
+    drawn = SUPERSAMPLING * size
     camera = studio(drawn)
     camera.arrange(standing, _sample_lights(rng), [view.camera for view in views], pictures)
     sensors = [Sensor(rng, view.lens, drawn, size) for view in views]

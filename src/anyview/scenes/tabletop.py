@@ -29,7 +29,7 @@ def sample_object(rng: np.random.Generator, table: Colour) -> list[Shape]:
         return [ellipsoid((radius, radius, half), (0, 0, half), look)]
     body = [cylinder(radius, half, (0, 0, half), look)]
     if kind == "capped":
-        cap = looks.surface(rng, looks.colour(rng))
+        cap = looks.surface(rng, looks.colour(rng), casts_shadow=False)
         body.append(cylinder(radius * rng.uniform(0.2, 0.8), 0.002, (0, 0, 2 * half), cap))
     return body
 
@@ -81,7 +81,7 @@ def _block(rng: np.random.Generator, look: Surface) -> tuple[list[Shape], float]
     x, y, z = rng.uniform(0.015, 0.06), rng.uniform(0.015, 0.05), rng.uniform(0.008, 0.05)
     shapes = [box((x, y, z), (0, 0, z), look)]
     if rng.random() < 0.4:
-        lid = looks.surface(rng, looks.colour(rng))
+        lid = looks.surface(rng, looks.colour(rng), casts_shadow=False)
         shapes.append(box((x * 0.9, y * 0.9, 0.003), (0, 0, 2 * z), lid))
     return shapes, math.hypot(x, y)
 
@@ -90,7 +90,7 @@ def _can(rng: np.random.Generator, look: Surface) -> tuple[list[Shape], float]:
     radius, half = rng.uniform(0.018, 0.05), rng.uniform(0.01, 0.065)
     shapes = [cylinder(radius, half, (0, 0, half), look)]
     if rng.random() < 0.6:
-        inside = Surface(looks.colour(rng))
+        inside = Surface(looks.colour(rng), casts_shadow=False)
         shapes.append(cylinder(radius * rng.uniform(0.3, 0.9), 0.001, (0, 0, 2 * half), inside))
     if rng.random() < 0.3:
         shapes.append(capsule((radius, 0, half * 0.6), (radius + 0.015, 0, half * 1.4), 0.006, look))
@@ -107,7 +107,7 @@ def _stick(rng: np.random.Generator, look: Surface) -> tuple[list[Shape], float]
     half, radius = rng.uniform(0.03, 0.10), rng.uniform(0.003, 0.008)
     shapes = [capsule((-half, 0, radius), (half, 0, radius), radius, look)]
     if rng.random() < 0.4:
-        tip = looks.surface(rng, looks.colour(rng))
+        tip = looks.surface(rng, looks.colour(rng), casts_shadow=False)
         shapes.append(capsule((half * 0.5, 0, radius), (half, 0, radius), radius * 1.2, tip))
     return shapes, half
 
@@ -138,7 +138,7 @@ def _bottle(rng: np.random.Generator, look: Surface) -> tuple[list[Shape], float
 
 def _plate(rng: np.random.Generator, look: Surface) -> tuple[list[Shape], float]:
     radius, half = rng.uniform(0.04, 0.09), rng.uniform(0.002, 0.012)
-    middle = looks.surface(rng, looks.colour(rng))
+    middle = looks.surface(rng, looks.colour(rng), casts_shadow=False)
     return [
         cylinder(radius, half, (0, 0, half), look),
         cylinder(radius * rng.uniform(0.3, 0.9), 0.001, (0, 0, 2 * half), middle),
