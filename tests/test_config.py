@@ -81,6 +81,11 @@ def test_the_committed_params_are_sound():
         ("split.wide", {"validation": 0.1}, "split.wide: 'wide' is none of these: diverse, narrow, real"),
         ("simulate.sets", {"wide": {"contexts": "diverse", "demos": 4}}, "split.wide: missing key"),
         (
+            "simulate.sets.rendered",
+            {"contexts": "diverse", "demos": 4},
+            "simulate.sets.rendered: the name is taken by the clips that stage render makes",
+        ),
+        (
             "simulate.sets.real",
             {"contexts": "diverse", "demos": 4},
             "simulate.sets.real: the name is taken by the clips that stage ingest makes",

@@ -17,7 +17,7 @@ from pydantic import (
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from anyview.paths import REAL
+from anyview.paths import REAL, RENDERED
 from anyview.runtime.errors import AnyviewError
 
 
@@ -98,6 +98,18 @@ class Ingest(Block):
     frames: int = Field(ge=8, le=10_000, description="frames of a clip")
     rate: Positive = Field(description="frames per second after resampling")
     max_megabytes: Positive = Field(description="a larger raw file is refused")
+    even_exposure: bool = Field(
+        description="bring each frame's exposure and white balance to those of its clip's first frame"
+    )
+
+
+class Render(Block):
+    """Stage `render`: scenes of every look, to pretrain on. Their size is that of `real.ingest`."""
+
+    demonstrations: Count = Field(
+        description="demonstrations, each in a scene of its own, seen by two cameras"
+    )
+    moments: Count = Field(description="random moments of each, besides the first frame")
 
 
 class Real(Block):
@@ -108,6 +120,7 @@ class Real(Block):
     )
     film: Film
     ingest: Ingest
+    render: Render
 
 
 class SplitSet(Block):
@@ -350,7 +363,7 @@ def load_params(path: Path = Path("params.yaml")) -> Params:
 
 def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
     """Names in ``params`` that must be those of other keys: (dotted key, name, the names that fit)."""
-    sets = [*params.simulate.sets, REAL]
+    sets = [*params.simulate.sets, REAL, RENDERED]
     yield from ((f"split.{name}", name, sets) for name in params.split)
     for block, models in (("translators", params.translators), ("embeddings", params.embeddings)):
         yield from ((f"{block}.{key}.dataset", cell.dataset, sets) for key, cell in models.items())
@@ -366,11 +379,12 @@ def _refuse_twins(params: Params, name: str) -> None:
         ("embeddings", params.embeddings, "translators", params.translators),
         ("adversarial.cells", params.adversarial.cells, "imitation.cells", params.imitation.cells),
         ("simulate.sets", params.simulate.sets, "the clips that stage ingest makes", [REAL]),
+        ("simulate.sets", params.simulate.sets, "the clips that stage render makes", [RENDERED]),
     ):
         for cell in key:
             if cell in taken:
                 raise AnyviewError(f"{name}: {block}.{cell}: the name is taken by {other}")
-    for dataset in (*params.simulate.sets, REAL):
+    for dataset in (*params.simulate.sets, REAL, RENDERED):
         if dataset not in params.split:
             raise AnyviewError(f"{name}: split.{dataset}: missing key")
 

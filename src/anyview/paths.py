@@ -6,7 +6,8 @@ DATA = Path("data")
 METRICS = Path("metrics")
 REPORT = DATA / "report"
 
-REAL = "real"  # the set of clips that ingest makes; the others are simulated
+REAL = "real"  # the set of clips that ingest makes
+RENDERED = "rendered"  # the set that stage render makes; the others are simulated
 
 
 def raw(source: str) -> Path:
