@@ -149,6 +149,9 @@ class TranslatorCell(Block):
     iterations: Count
     weights: LossWeights
     augment: bool = Field(description="augment the contexts during training")
+    schedule: Literal["constant", "cosine"] | None = Field(
+        default=None, description="the cell's own instead of `training.schedule`"
+    )
 
 
 class EmbeddingCell(Block):
@@ -231,10 +234,11 @@ class Discriminator(Block):
 
 
 class RewardWeights(Block):
-    """Weights of a reward's terms, each in units of what standing still costs; 0 leaves a term out."""
+    """Weights of a reward's terms, in units of what standing still costs unless `raw`; 0 leaves one out."""
 
     feature: NonNegative = Field(description="of L_f, the distance of features")
     image: NonNegative = Field(description="of L_i, the distance of pixels: phi where `feature` is 1")
+    raw: bool = Field(default=False, description="the terms in their own units, as in equation 22")
 
     @model_validator(mode="after")
     def _some_term(self) -> "RewardWeights":
