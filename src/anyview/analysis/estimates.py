@@ -20,10 +20,9 @@ class Estimate:
     low: float
     high: float
 
-    @property
-    def excludes_zero(self) -> bool:
-        """Whether the whole interval lies on one side of 0."""
-        return self.low > 0 or self.high < 0
+    def exponential(self) -> "Estimate":
+        """e to the power of value and bounds: a difference of logarithms as a ratio."""
+        return Estimate(math.exp(self.value), math.exp(self.low), math.exp(self.high))
 
 
 @dataclass(frozen=True)
