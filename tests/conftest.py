@@ -48,9 +48,9 @@ def copy_of_the_repository(folder: Path) -> Path:
 
     new = [name for name in listed("--others") if not name.startswith("data/")]  # data is DVC's
     for name in [*listed("--cached"), *new]:
-        if (ROOT / name).is_file():
+        if (ROOT / name).is_file() or (ROOT / name).is_symlink():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(ROOT / name, folder / name)
+            shutil.copy2(ROOT / name, folder / name, follow_symlinks=False)
     git = [
         "git",
         "-c",

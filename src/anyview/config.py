@@ -300,6 +300,25 @@ class Adversarial(Block):
     cells: dict[Name, AdversarialCell]
 
 
+class Evidence(Block):
+    """Pipeline `evidence`: the translators of figure 20, each trained several times, as models of `ours`."""
+
+    translators: list[str] = Field(
+        min_length=2, description="cells of `translators`; the first has every loss, the others lack some"
+    )
+    seeds: list[Annotated[int, Field(ge=0)]] = Field(
+        min_length=1, description="of the trainings, one of each translator for each seed"
+    )
+    iterations: Count = Field(description="of each training, instead of the cell's own")
+    rewards: dict[Name, RewardWeights] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _all_different(self) -> "Evidence":
+        if any(len(set(names)) < len(names) for names in (self.translators, self.seeds)):
+            raise ValueError("a translator or a seed is listed twice")
+        return self
+
+
 class Params(Block):
     """The whole of ``params.yaml``."""
 
@@ -314,6 +333,7 @@ class Params(Block):
     assessment: Assessment
     imitation: Imitation
     adversarial: Adversarial
+    evidence: Evidence
 
     @property
     def methods(self) -> dict[str, DemonstrationCell | EmbeddingRewardCell | AdversarialCell]:
@@ -362,6 +382,7 @@ def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
     for key, cell in params.imitation.cells.items():
         fitting = params.embeddings if cell.reward == "embedding" else params.translators
         yield f"imitation.cells.{key}.model", cell.model, fitting
+    yield from (("evidence.translators", name, params.translators) for name in params.evidence.translators)
 
 
 def _refuse_twins(params: Params, name: str) -> None:

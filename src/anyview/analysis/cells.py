@@ -34,6 +34,11 @@ def label(cell: str) -> str:
     return LABELS.get(cell, cell)
 
 
+def ablation(translator: str) -> str:
+    """The method that has this translator of figure 20: `no-alignment` for `sim-no-alignment`."""
+    return OURS if translator == SIM else translator.removeprefix(f"{SIM}-")
+
+
 def in_order(cells: Iterable[str]) -> list[str]:
     """Known cells in the order of the labels, then the others by name."""
     known = list(LABELS)

@@ -8,6 +8,9 @@ from scipy import stats
 Interval = tuple[float, float]
 
 RESAMPLES = 10_000
+_EXACT_WAYS = (
+    50_000  # two samples of 9 can be dealt out in 48,620 ways; where there are more, so many are drawn
+)
 EXACT_PAIRS = 40
 """Up to so many pairs the sign-flip test counts every pattern of signs; beyond, it takes the normal limit."""
 
@@ -65,6 +68,21 @@ def sign_flip_test(differences: np.ndarray) -> float:
     first, second = (_signed_sums(half) for half in np.array_split(differences, 2))
     reached = len(second) - np.searchsorted(np.sort(second), seen - first)
     return float(2 * reached.sum() / 2 ** len(differences))
+
+
+def exchange_test(first: np.ndarray, second: np.ndarray) -> float:
+    """p-value of the two-sided exact permutation test of the means of two samples, (n,) and (m,).
+
+    If it makes no difference from which sample a value is, every way of dealing them out is as likely.
+    """
+    found = stats.permutation_test(
+        (first, second), _difference_of_means, n_resamples=_EXACT_WAYS, rng=np.random.default_rng(0)
+    )
+    return float(found.pvalue)
+
+
+def _difference_of_means(first: np.ndarray, second: np.ndarray, axis: int) -> np.ndarray:
+    return np.mean(first, axis=axis) - np.mean(second, axis=axis)
 
 
 def _signed_sums(values: np.ndarray) -> np.ndarray:
