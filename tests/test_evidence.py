@@ -19,13 +19,17 @@ def evidence(trunk, tmp_path_factory) -> Study:
 
 
 def test_dvc_plans_every_translator_seed_and_reward(evidence):
-    said = evidence.run("dvc", "repro", "--dry")
     params = load_params(evidence.folder / "params.yaml").evidence
-    for name in params.translators:
-        for seed in params.seeds:
-            assert f"python train.py {name} {seed}\n" in said
-            for reward in params.rewards:
-                assert f"python imitate.py {name} {seed} {reward}\n" in said
+    cells = [f"{name}-{seed}" for name in params.translators for seed in params.seeds]
+    said = evidence.run(
+        "dvc", "repro", "--dry", "train"
+    )  # with `imitate` it asks for the translators' folders
+    assert all(f"> python train.py {' '.join(cell.rsplit('-', 1))}\n" in said for cell in cells)
+    stages = evidence.run("dvc", "stage", "list", "--name-only").split()
+    expected = {f"train@{cell}" for cell in cells}
+    assert set(stages) == expected | {
+        f"imitate@{cell}-{reward}" for cell in cells for reward in params.rewards
+    }
 
 
 def test_one_translator_runs_under_one_reward_and_the_study_does_not_see_it(evidence):
