@@ -100,7 +100,8 @@ class Study:
 
     def copy(self, folder: Path) -> "Study":
         """The same study in the new ``folder``, with an empty scratch folder."""
-        shutil.copytree(self.folder, folder / "study", ignore=shutil.ignore_patterns(".venv", "tmp"))
+        left_out = shutil.ignore_patterns(".venv", "tmp")
+        shutil.copytree(self.folder, folder / "study", symlinks=True, ignore=left_out)
         return Study(folder / "study", folder / "scratch")
 
 

@@ -39,7 +39,7 @@ def test_one_translator_runs_under_one_reward_and_the_study_does_not_see_it(evid
     assert "didn't change" in evidence.run("dvc", "repro", "imitate@sim-no-alignment-2-raw")
     study = Study(evidence.folder.parent, evidence.scratch)
     assert not list((study.folder / "data/models").glob("*-seed-*"))
-    assert "seed" not in study.run("dvc", "status")
+    assert "-seed-" not in study.run("dvc", "status")
     assert study.run("git", "status", "--porcelain", "evidence").split() == ["??", "evidence/dvc.lock"]
 
 
