@@ -156,6 +156,12 @@ def test_the_committed_params_are_sound():
             "gail",
             "imitation.cells.ours.reward: Input should be 'translated', 'true' or 'embedding'",
         ),
+        (
+            "evidence.translators",
+            ["sim", "tcn"],
+            "evidence.translators: 'tcn' is none of these: real-adam, ",
+        ),
+        ("evidence.seeds", [1, 2, 1], "evidence: a translator or a seed is listed twice"),
         ("real.ingest.frames", 10**6, "real.ingest.frames: Input should be less than or equal to 10000"),
     ],
 )

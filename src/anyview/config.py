@@ -162,6 +162,9 @@ class TranslatorCell(Block):
     iterations: Count
     weights: LossWeights
     augment: bool = Field(description="augment the contexts during training")
+    schedule: Literal["constant", "cosine"] | None = Field(
+        default=None, description="the cell's own instead of `training.schedule`"
+    )
 
 
 class EmbeddingCell(Block):
@@ -244,10 +247,11 @@ class Discriminator(Block):
 
 
 class RewardWeights(Block):
-    """Weights of a reward's terms, each in units of what standing still costs; 0 leaves a term out."""
+    """Weights of a reward's terms, in units of what standing still costs unless `raw`; 0 leaves one out."""
 
     feature: NonNegative = Field(description="of L_f, the distance of features")
     image: NonNegative = Field(description="of L_i, the distance of pixels: phi where `feature` is 1")
+    raw: bool = Field(default=False, description="the terms in their own units, as in equation 22")
 
     @model_validator(mode="after")
     def _some_term(self) -> "RewardWeights":
@@ -309,6 +313,25 @@ class Adversarial(Block):
     cells: dict[Name, AdversarialCell]
 
 
+class Evidence(Block):
+    """Pipeline `evidence`: the translators of figure 20, each trained several times, as models of `ours`."""
+
+    translators: list[str] = Field(
+        min_length=2, description="cells of `translators`; the first has every loss, the others lack some"
+    )
+    seeds: list[Annotated[int, Field(ge=0)]] = Field(
+        min_length=1, description="of the trainings, one of each translator for each seed"
+    )
+    iterations: Count = Field(description="of each training, instead of the cell's own")
+    rewards: dict[Name, RewardWeights] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _all_different(self) -> "Evidence":
+        if any(len(set(names)) < len(names) for names in (self.translators, self.seeds)):
+            raise ValueError("a translator or a seed is listed twice")
+        return self
+
+
 class Params(Block):
     """The whole of ``params.yaml``."""
 
@@ -323,6 +346,7 @@ class Params(Block):
     assessment: Assessment
     imitation: Imitation
     adversarial: Adversarial
+    evidence: Evidence
 
     @property
     def methods(self) -> dict[str, DemonstrationCell | EmbeddingRewardCell | AdversarialCell]:
@@ -371,6 +395,7 @@ def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
     for key, cell in params.imitation.cells.items():
         fitting = params.embeddings if cell.reward == "embedding" else params.translators
         yield f"imitation.cells.{key}.model", cell.model, fitting
+    yield from (("evidence.translators", name, params.translators) for name in params.evidence.translators)
 
 
 def _refuse_twins(params: Params, name: str) -> None:
