@@ -36,8 +36,13 @@ def run_stage(main: Callable[[list[str]], None]) -> NoReturn:
     The process ends when its parent does, so that a killed ``dvc repro`` leaves no orphan behind.
     """
     end_with_parent()
-    signal.signal(signal.SIGTERM, _raise_terminated)
+    raise_when_terminated()
     sys.exit(exit_code(lambda: main(sys.argv[1:]), "interrupted: run the same command again to continue"))
+
+
+def raise_when_terminated() -> None:
+    """Let SIGTERM raise ``Terminated`` in the main thread from now on."""
+    signal.signal(signal.SIGTERM, _raise_terminated)
 
 
 def exit_code(action: Callable[[], object], interrupted: str = "interrupted") -> int:
