@@ -86,7 +86,9 @@ def test_dry_tells_what_would_run(plain, tmp_path):
 def test_a_failure_stops_what_depends_on_it(fresh, tmp_path):
     """The rest finishes, and the summary names the log; with --fail-fast nothing more starts."""
     toy = fresh.copy(tmp_path / "toy")
-    (toy.folder / "dvc.yaml").write_text(DIAMOND.replace("cat start >", "echo oh dear; false; cat start >"))
+    (toy.folder / "dvc.yaml").write_text(
+        DIAMOND.replace("cat start >", "echo oh dear && false && cat start >")
+    )
     said = toy.run("anyview", "repro", "-j", "1", code=1)
     assert "2 ran, 2 failed" in said
     assert "skipped: end" in said

@@ -1,6 +1,8 @@
 """What a run would do with each stage, asked of DVC without changing anything."""
 
-from collections.abc import Mapping
+import logging
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
@@ -25,7 +27,7 @@ def forecast(repo: "Repo", graph: Graph, stages: "Mapping[str, Stage]", force: b
     from dvc.repo import lock_repo
 
     found: dict[str, Forecast] = {}
-    with lock_repo(repo):
+    with lock_repo(repo), _silence():
         for address, node in graph.items():
             if force:
                 found[address] = Forecast.RUNS
@@ -34,6 +36,17 @@ def forecast(repo: "Repo", graph: Graph, stages: "Mapping[str, Stage]", force: b
             else:
                 found[address] = _forecast(repo, stages[address])
     return found
+
+
+@contextmanager
+def _silence() -> Iterator[None]:
+    """DVC would announce each stage of the run cache."""
+    before = logging.root.manager.disable
+    logging.disable(logging.INFO)
+    try:
+        yield
+    finally:
+        logging.disable(before)
 
 
 def _forecast(repo: "Repo", stage: "Stage") -> Forecast:
