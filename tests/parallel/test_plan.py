@@ -1,11 +1,13 @@
 """Schedules against what must hold of every one, on random graphs."""
 
 import hypothesis.strategies as st
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 
 from anyview.parallel.graph import Graph, Node
 from anyview.parallel.needs import Needs
 from anyview.parallel.plan import simulate, ways
+
+anywhere = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 
 
 @st.composite
@@ -27,6 +29,7 @@ def longest(graph: Graph, seconds: dict[str, float]) -> float:
     return max(until(name) for name in graph)
 
 
+@anywhere
 @given(graphs())
 def test_with_cores_for_all_the_longest_chain_decides(case):
     graph, seconds = case
@@ -35,12 +38,14 @@ def test_with_cores_for_all_the_longest_chain_decides(case):
     assert sum(takes for _, takes in plan.path) == plan.seconds
 
 
+@anywhere
 @given(graphs())
 def test_one_core_takes_the_sum(case):
     graph, seconds = case
     assert simulate(graph, seconds, cores=1).seconds == sum(seconds.values())
 
 
+@anywhere
 @given(graphs(), st.integers(1, 6))
 def test_no_schedule_uses_more_than_there_is_or_starts_too_early(case, cores):
     graph, seconds = case
@@ -57,6 +62,7 @@ def test_no_schedule_uses_more_than_there_is_or_starts_too_early(case, cores):
         assert plan.seconds <= sum(seconds.values()) / cores + longest(graph, seconds)
 
 
+@anywhere
 @given(graphs())
 def test_what_is_done_or_running_is_not_done_again(case):
     graph, seconds = case
