@@ -290,6 +290,7 @@ class Imitation(Block):
     dataset: str = Field(description="simulated set whose held-out clips are imitated")
     demonstrations: Count = Field(description="clips that are imitated, the same for every run and method")
     runs: Count = Field(description="contexts, each with a policy of its own")
+    group: Count = Field(description="runs in lockstep: with 2, 15 runs keep 8 cores busy instead of 2")
     iterations: Count
     episodes_per_iteration: Count = Field(
         description="episodes of 49 steps that each run acts in an iteration"
