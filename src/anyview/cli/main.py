@@ -12,6 +12,7 @@ import typer
 from rich.console import Console
 
 from anyview.cli.clips import clips
+from anyview.cli.export import export
 from anyview.cli.record import record
 from anyview.cli.review import review, sweep
 from anyview.cli.translate import translate
@@ -126,7 +127,7 @@ def clean(as_json: Annotated[bool, typer.Option("--json", help="Print JSON for a
         print(f"{folder}: {freed / 1e6:.0f} MB freed")
 
 
-for command in (doctor, profile, record, clips, translate, watch, review, sweep, clean):
+for command in (doctor, profile, record, clips, export, translate, watch, review, sweep, clean):
     app.command()(command)
 
 
@@ -139,7 +140,8 @@ def _run() -> None:
     try:
         app(prog_name="anyview")
     except ModuleNotFoundError as error:
-        raise AnyviewError(f"{error}; run `make setup`") from None
+        advice = "pip install -e '.[lerobot]'" if error.name == "pyarrow" else "run `make setup`"
+        raise AnyviewError(f"{error}; {advice}") from None
     except SystemExit as ended:
         if ended.code:
             raise
