@@ -1,4 +1,4 @@
-"""A set of clips as a LeRobotDataset, read back by its documented layout, and by the library if it is here."""
+"""A set of clips as a LeRobotDataset, read back by its documented layout, and by the library where it is."""
 
 import json
 from pathlib import Path
