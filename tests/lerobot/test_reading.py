@@ -195,4 +195,4 @@ def test_without_the_extra_the_command_says_how_to_install_it(copied, tmp_path):
     )
     _, err = process.communicate()
     assert process.returncode == 2
-    assert err == "error: no pyarrow; pip install -e '.[lerobot]'\n"
+    assert err == "error: no pyarrow; pip install 'anyview[lerobot]'\n"

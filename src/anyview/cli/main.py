@@ -140,7 +140,7 @@ def _run() -> None:
     try:
         app(prog_name="anyview")
     except ModuleNotFoundError as error:
-        advice = "pip install -e '.[lerobot]'" if error.name == "pyarrow" else "run `make setup`"
+        advice = "pip install 'anyview[lerobot]'" if error.name == "pyarrow" else "run `make setup`"
         raise AnyviewError(f"{error}; {advice}") from None
     except SystemExit as ended:
         if ended.code:
