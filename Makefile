@@ -18,6 +18,7 @@ INSTALL := python -m pip install --quiet
 COMPILE := pip-compile --quiet --generate-hashes --strip-extras --build-deps-for editable \
 	--unsafe-package pip --unsafe-package torch \
 	--no-emit-index-url --no-emit-find-links --no-emit-options --pip-args "$(PIP_ARGS)"
+PARALLEL := --numprocesses logical --maxprocesses 4 --dist loadgroup # see tests/conftest.py
 GL_PACKAGES := libegl1 libopengl0 libgl1-mesa-dri libosmesa6
 
 .PHONY: help repro test test-slow lint format bench setup setup-dev lock audit clean
@@ -30,10 +31,10 @@ repro: .setup-stamp .setup-stamp-graphics ## run the whole pipeline; only what c
 	dvc repro
 
 test: lint .setup-stamp-graphics ## lint, type check and the fast tests
-	python -m pytest
+	python -m pytest $(PARALLEL)
 
 test-slow: .setup-stamp-dev .setup-stamp-graphics .setup-stamp-browser ## kills, clusters, browsers, queues: minutes each
-	python -m pytest -m slow --durations=12
+	python -m pytest $(PARALLEL) -m slow --durations=12
 
 lint: .setup-stamp-dev ## ruff, mypy and who may import whom
 	ruff check .

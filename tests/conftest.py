@@ -24,6 +24,14 @@ load_mujoco()
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests of one file go to one process, and those that need the whole pipeline all to the first."""
+    for item in items:
+        group = "pipeline" if "smoke" in getattr(item, "fixturenames", ()) else str(item.path)
+        item.add_marker(pytest.mark.xdist_group(group))
+    items.sort(key=lambda item: "smoke" not in getattr(item, "fixturenames", ()))  # the longest first
+
+
 @pytest.fixture(scope="session")
 def root() -> Path:
     """The root of the repository."""
