@@ -102,7 +102,8 @@ def test_every_import_is_declared():
     owners = {
         name: {dist.lower().replace("_", "-") for dist in distributions.get(name, [name])} for name in used
     }
-    optional = names(project["optional-dependencies"]["cluster"])
+    extras = project["optional-dependencies"]
+    optional = names([*extras["cluster"], *extras["lerobot"]])
     assert {name for name, found in owners.items() if not found & (required | optional)} == set()
     assert required - set().union(*owners.values()) == set()
 
