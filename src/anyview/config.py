@@ -153,6 +153,13 @@ class LossWeights(Block):
         return self
 
 
+class Pretraining(Block):
+    """What a translator learns from before it sees its own clips."""
+
+    dataset: str = Field(description="set of clips to pretrain on; the cell's own set where there is none")
+    iterations: CountOrNone = Field(description="how many of the cell's iterations that takes; 0 for none")
+
+
 class TranslatorCell(Block):
     """Stage `train`: one context translator."""
 
@@ -161,10 +168,20 @@ class TranslatorCell(Block):
     optimizer: Literal["adam", "adadelta"]
     iterations: Count
     weights: LossWeights
+    pairs: Literal["any", "views"] = Field(
+        default="any", description="clips to pair: `any` two, or the `views` of one demonstration"
+    )
+    pretraining: Pretraining
     augment: bool = Field(description="augment the contexts during training")
     schedule: Literal["constant", "cosine"] | None = Field(
         default=None, description="the cell's own instead of `training.schedule`"
     )
+
+    @model_validator(mode="after")
+    def _some_own_iterations(self) -> "TranslatorCell":
+        if self.pretraining.iterations >= self.iterations:
+            raise ValueError("pretraining.iterations must be below iterations, which count them")
+        return self
 
 
 class EmbeddingCell(Block):
@@ -392,6 +409,8 @@ def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
     yield from ((f"split.{name}", name, sets) for name in params.split)
     for block, models in (("translators", params.translators), ("embeddings", params.embeddings)):
         yield from ((f"{block}.{key}.dataset", cell.dataset, sets) for key, cell in models.items())
+    for key, translator in params.translators.items():
+        yield f"translators.{key}.pretraining.dataset", translator.pretraining.dataset, sets
     yield "imitation.dataset", params.imitation.dataset, list(params.simulate.sets)
     for key, cell in params.imitation.cells.items():
         fitting = params.embeddings if cell.reward == "embedding" else params.translators

@@ -8,9 +8,10 @@ from torch import Tensor
 
 from anyview.config import Training, TranslatorCell
 from anyview.runtime.device import products_in
+from anyview.runtime.errors import AnyviewError
 from anyview.seeds import stream, torch_seed
 from anyview.training.augmentation import Augmentation
-from anyview.training.common.batches import FramePairs, training_pairs, validation_pairs
+from anyview.training.common.batches import FramePairs, training_pairs, training_views, validation_pairs
 from anyview.training.common.optimization import MakeOptimizer
 from anyview.translator.losses import NAMES, Losses, batch_losses
 from anyview.translator.network import ContextTranslator
@@ -26,15 +27,37 @@ _OPTIMIZERS: dict[str, MakeOptimizer] = {
 
 
 class TranslatorObjective:
-    """See ``fit.Objective``. Losses: L, L_tr, L_rec and L_align, NaN where the cell leaves one out."""
+    """See ``fit.Objective``. Losses: L, L_tr, L_rec and L_align, NaN where the cell leaves one out.
+
+    The first ``cell.pretraining.iterations`` learn from the data set ``pretraining``, the others from
+    ``dataset``, which also validates from the start. Raises AnyviewError if their frames differ in size.
+    """
 
     names = ("loss", *NAMES)
 
-    def __init__(self, cell: TranslatorCell, training: Training, seed: int, dataset: Dataset):
+    def __init__(
+        self,
+        cell: TranslatorCell,
+        training: Training,
+        seed: int,
+        dataset: Dataset,
+        pretraining: Dataset | None = None,
+    ):
         self.cell, self.seed, self.dataset = cell, seed, dataset
+        self._pretraining = pretraining or dataset
+        if self._pretraining.image_size != dataset.image_size:
+            sizes = f"{self._pretraining.image_size} and {dataset.image_size} pixels"
+            raise AnyviewError(f"data sets {self._pretraining.name} and {dataset.name}: frames of {sizes}")
         self.training = training.model_copy(update={"schedule": cell.schedule or training.schedule})
         self.optimizer = _OPTIMIZERS[cell.optimizer]
-        self._augmentation = Augmentation(dataset) if cell.augment else None
+        self._augmentations = (
+            {learnt.name: Augmentation(learnt) for learnt in self._learnt()} if cell.augment else {}
+        )
+
+    @property
+    def dataset_names(self) -> list[str]:
+        """Of the sets of clips that the training reads."""
+        return [dataset.name for dataset in self._learnt()]
 
     def network(self) -> ContextTranslator:
         """With the same first weights for every cell of an architecture: ablations differ in losses alone."""
@@ -46,17 +69,19 @@ class TranslatorObjective:
     def batch(self, iteration: int) -> FramePairs:
         """``batch_size`` pairs of one frame each."""
         rng = stream(self.seed, "translator/pairs", iteration)
-        return training_pairs(self.dataset, rng, self.training.batch_size)
+        draw = {"any": training_pairs, "views": training_views}[self.cell.pairs]
+        return draw(self._learnt_at(iteration), rng, self.training.batch_size)
 
     def losses(self, model: ContextTranslator, pairs: FramePairs, iteration: int, part: int) -> Tensor:
         """(4,), with dropout and augmentation."""
         device = next(model.parameters()).device
-        paired, context = self._frames(pairs, device)
-        if self._augmentation is not None:
+        dataset = self._learnt_at(iteration)
+        paired, context = _frames(dataset, pairs, device)
+        if augmentation := self._augmentations.get(dataset.name):
             rng = stream(self.seed, "translator/augmentation", iteration, part)
             expert, target = paired.chunk(2)
-            (expert,) = self._augmentation(expert[None], pairs.sources, rng)
-            context, target = self._augmentation(torch.stack((context, target)), pairs.targets, rng)
+            (expert,) = augmentation(expert[None], pairs.sources, rng)
+            context, target = augmentation(torch.stack((context, target)), pairs.targets, rng)
             paired = torch.cat((expert, target))
         seed = torch_seed(self.seed, "translator/dropout", iteration, part)
         noise = torch.Generator(device).manual_seed(seed)
@@ -74,7 +99,7 @@ class TranslatorObjective:
         """L_tr, L_rec and L_align, (3,)."""
         device = next(model.parameters()).device
         with products_in(self.training.precision, device):
-            losses = batch_losses(model, *self._frames(pairs, device))
+            losses = batch_losses(model, *_frames(self.dataset, pairs, device))
         return torch.stack(losses.parts())
 
     def validation_row(self, means: Tensor) -> dict[str, float]:
@@ -86,7 +111,14 @@ class TranslatorObjective:
         """Write a model folder."""
         save_translator(folder, model, meta)
 
-    def _frames(self, pairs: FramePairs, device: torch.device) -> tuple[Tensor, Tensor]:
-        """o_t^i and after them o_t^j (2N, 3, H, W), and o_0^j (N, 3, H, W)."""
-        paired, context = pairs.frames(self.dataset), pairs.contexts(self.dataset)
-        return tuple(to_input(torch.from_numpy(frames).to(device)) for frames in (paired, context))  # type: ignore[return-value]
+    def _learnt(self) -> list[Dataset]:
+        return [self._pretraining, self.dataset] if self.cell.pretraining.iterations else [self.dataset]
+
+    def _learnt_at(self, iteration: int) -> Dataset:
+        return self._pretraining if iteration < self.cell.pretraining.iterations else self.dataset
+
+
+def _frames(dataset: Dataset, pairs: FramePairs, device: torch.device) -> tuple[Tensor, Tensor]:
+    """o_t^i and after them o_t^j (2N, 3, H, W), and o_0^j (N, 3, H, W)."""
+    paired, context = pairs.frames(dataset), pairs.contexts(dataset)
+    return tuple(to_input(torch.from_numpy(frames).to(device)) for frames in (paired, context))  # type: ignore[return-value]
