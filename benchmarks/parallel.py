@@ -3,8 +3,8 @@
     python benchmarks/parallel.py [--stages 176] [--seconds 0.5] [--jobs 1 2 4 8 16]
 
 Chains of stages in a toy repository sleep and write a line. Overhead is what a run takes beyond its stages'
-sleep: in seconds of the clock beyond the sleep divided by the jobs, and in seconds of the processor, which other
-work on the machine does not change. Both are given as fractions of the work, if each stage worked for
+sleep: in seconds of the clock beyond the sleep divided by the jobs, and in seconds of the processor, which
+other work on the machine hardly changes. Both are given as fractions of the work, if each stage worked for
 5.2 seconds, as those of the pipeline did for which Pivot states 1.6% for itself and 24.8% for DVC.
 """
 
@@ -63,10 +63,8 @@ def main() -> None:
     for name, (jobs, command) in ways.items():
         clock, processor, lock = measure(given.stages, given.seconds, *command)
         beyond = clock - given.stages * given.seconds / min(jobs, CHAINS)
-        print(
-            f"{name:24} {clock:9.1f} {beyond:10.1f} {beyond / work:8.1%} {processor:13.1f} {processor / work:8.1%}",
-            flush=True,
-        )
+        cells = f"{clock:9.1f} {beyond:10.1f} {beyond / work:8.1%} {processor:13.1f} {processor / work:8.1%}"
+        print(f"{name:24} {cells}", flush=True)
         locks.add(lock)
     print("all locks equal" if len(locks) == 1 else "LOCKS DIFFER")
 

@@ -5,6 +5,7 @@ import random
 import signal
 import subprocess
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import psutil
@@ -41,10 +42,8 @@ def kill_one(process: subprocess.Popen[str], rng: random.Random, latest: float) 
     """Kill one of the run's processes within ``latest`` seconds; wait for the end of the run."""
     time.sleep(rng.uniform(0, latest))
     if there := victims(process):
-        try:
+        with suppress(psutil.NoSuchProcess):
             rng.choice(there).send_signal(rng.choice([signal.SIGKILL, signal.SIGTERM]))
-        except psutil.NoSuchProcess:
-            pass
     process.communicate(timeout=300)
 
 
