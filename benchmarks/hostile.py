@@ -117,7 +117,7 @@ def raw_clip(name: str, codec: str, sides: bytes, claimed: bytes) -> Callable[[P
         from anyview.config import Ingest
         from anyview.ingest.clips import Candidate, ingest_clip
 
-        limits = Ingest(size=48, frames=80, rate=10.0, max_megabytes=50.0)
+        limits = Ingest(size=48, frames=80, rate=10.0, max_megabytes=50.0, even_exposure=False)
         writer = cv2.VideoWriter(
             str(box / name), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*codec), 10.0, (160, 90)
         )

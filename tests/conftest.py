@@ -56,9 +56,9 @@ def copy_of_the_repository(folder: Path) -> Path:
 
     new = [name for name in listed("--others") if not name.startswith("data/")]  # data is DVC's
     for name in [*listed("--cached"), *new]:
-        if (ROOT / name).is_file():
+        if (ROOT / name).is_file() or (ROOT / name).is_symlink():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(ROOT / name, folder / name)
+            shutil.copy2(ROOT / name, folder / name, follow_symlinks=False)
     git = [
         "git",
         "-c",
@@ -108,7 +108,8 @@ class Study:
 
     def copy(self, folder: Path) -> "Study":
         """The same study in the new ``folder``, with an empty scratch folder."""
-        shutil.copytree(self.folder, folder / "study", ignore=shutil.ignore_patterns(".venv", "tmp"))
+        left_out = shutil.ignore_patterns(".venv", "tmp")
+        shutil.copytree(self.folder, folder / "study", symlinks=True, ignore=left_out)
         return Study(folder / "study", folder / "scratch")
 
 

@@ -78,6 +78,7 @@ TESTS_OF_A_WHOLE = {"test_browser.py", "test_resume.py"}
 
 MODULES = sorted(SOURCE.rglob("*.py"))
 STAGES = sorted((ROOT / "stages").glob("*.py"))
+EVIDENCE = ROOT / "evidence"  # a DVC repository of its own, with links to code and data sets
 
 
 def test_imports_point_one_way():
@@ -104,29 +105,29 @@ def test_every_import_is_declared():
     extras = project["optional-dependencies"]
     optional = names([*extras["cluster"], *extras["lerobot"]])
     assert {name for name, found in owners.items() if not found & (required | optional)} == set()
-    assert required - set().union(*owners.values()) == {"dvc"}  # which is run, not imported
+    assert required - set().union(*owners.values()) == set()
 
 
 @cache
-def declared() -> dict[str, tuple[set[str], set[str]]]:
-    """dvc.yaml as DVC reads it: address of a stage -> (dependencies, outputs), relative to the root."""
-    with Repo(str(ROOT)) as repo:
+def declared(folder: Path = ROOT) -> dict[str, tuple[set[str], set[str]]]:
+    """A dvc.yaml as DVC reads it: address of a stage -> (dependencies, outputs), relative to its folder."""
+    with Repo(str(folder)) as repo:
         return {
-            stage.addressing: (
+            stage.name: (
                 {
-                    str(Path(dep.fs_path).relative_to(ROOT))
+                    str(Path(dep.fs_path).relative_to(folder))
                     for dep in stage.deps
                     if not isinstance(dep, ParamsDependency)
                 },
-                {str(Path(out.fs_path).relative_to(ROOT)) for out in stage.outs},
+                {str(Path(out.fs_path).relative_to(folder)) for out in stage.outs},
             )
             for stage in repo.index.stages
         }
 
 
-def code_of(stage: str) -> dict[str, set[str]]:
+def code_of(stage: str, folder: Path) -> dict[str, set[str]]:
     """Code that the cells of ``stage`` declare, files and folders."""
-    cells = {name: deps for name, (deps, _) in declared().items() if name.split("@")[0] == stage}
+    cells = {name: deps for name, (deps, _) in declared(folder).items() if name.split("@")[0] == stage}
     assert cells, f"{stage}: not in dvc.yaml"
     other = ("data/", "params.yaml", "stages/pipeline.yaml")
     return {name: {dep for dep in deps if not dep.startswith(other)} for name, deps in cells.items()}
@@ -143,23 +144,30 @@ def covers(dependency: str, file: str) -> bool:
     return file == dependency or file.startswith(f"{dependency}/")
 
 
-@pytest.mark.parametrize("stage", [path.stem for path in STAGES])
-def test_a_stage_depends_on_the_code_that_it_runs(stage):
+SCRIPTS = [(path, ROOT) for path in STAGES] + [
+    (EVIDENCE / f"{name}.py", EVIDENCE) for name in ("train", "imitate")
+]
+
+
+@pytest.mark.parametrize(("script", "folder"), SCRIPTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_a_stage_depends_on_the_code_that_it_runs(script, folder):
     """No edit goes unnoticed, and no folder is declared that the stage does not use.
 
     Cells may differ where each runs code of its own (a learner, a reward); together they name all of it.
     """
     reached = {
         file
-        for file in reached_from(ROOT / "stages" / f"{stage}.py")
+        for file in reached_from(script)
         if not file.startswith(WITHOUT_EFFECT_ON_RESULTS) and not file.endswith("__init__.py")
     }
-    cells = code_of(stage)
+    own = str(script.relative_to(folder))
+    reached = {own if file == str(script.relative_to(ROOT)) else file for file in reached}
+    cells = code_of(script.stem, folder)
     together = set().union(*cells.values())
     assert {file for file in reached if not any(covers(dependency, file) for dependency in together)} == set()
     assert {dep for dep in together if not any(covers(dep, file) for file in reached)} == set()
     for name, code in cells.items():
-        assert f"stages/{stage}.py" in code, name
+        assert own in code, name
 
 
 def rerun_by(file: str) -> set[str]:
@@ -197,6 +205,15 @@ def test_every_stage_has_a_script_and_every_script_a_stage():
     assert {name.split("@")[0] for name in declared()} == {path.stem for path in STAGES}
 
 
+def test_the_study_knows_nothing_of_the_evidence_and_this_plans_every_seed():
+    assert not any("-seed-" in out for _, outs in declared().values() for out in outs)
+    evidence = load_params(ROOT / "params.yaml").evidence
+    models = {f"{name}-seed-{seed}" for name in evidence.translators for seed in evidence.seeds}
+    outputs = {f"data/models/{model}" for model in models}
+    outputs |= {f"data/policies/{model}-{reward}" for model in models for reward in evidence.rewards}
+    assert set().union(*(outs for _, outs in declared(EVIDENCE).values())) == outputs
+
+
 def test_cells_are_those_of_params():
     params = load_params(ROOT / "params.yaml")
     cells: dict[str, set[str]] = {}
@@ -215,7 +232,7 @@ def test_the_report_reads_every_cell():
     """Its inputs are written out one by one: none may be forgotten, and none may be left over."""
     outputs = {out for address, (_, outs) in declared().items() if address != "report" for out in outs}
     data = {dep for dep in declared()["report"][0] if dep.startswith("data/")}
-    assert outputs - data <= {"data/raw/surrogate"}
+    assert outputs - data <= {"data/raw/surrogate", "data/clips/rendered", "data/splits/rendered.csv"}
     assert data <= outputs
 
 

@@ -17,7 +17,7 @@ from pydantic import (
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from anyview.paths import REAL
+from anyview.paths import REAL, RENDERED
 from anyview.runtime.errors import AnyviewError
 
 
@@ -98,6 +98,18 @@ class Ingest(Block):
     frames: int = Field(ge=8, le=10_000, description="frames of a clip")
     rate: Positive = Field(description="frames per second after resampling")
     max_megabytes: Positive = Field(description="a larger raw file is refused")
+    even_exposure: bool = Field(
+        description="bring each frame's exposure and white balance to those of its clip's first frame"
+    )
+
+
+class Render(Block):
+    """Stage `render`: scenes of every look, to pretrain on. Their size is that of `real.ingest`."""
+
+    demonstrations: Count = Field(
+        description="demonstrations, each in a scene of its own, seen by two cameras"
+    )
+    moments: Count = Field(description="random moments of each, besides the first frame")
 
 
 class Real(Block):
@@ -108,6 +120,7 @@ class Real(Block):
     )
     film: Film
     ingest: Ingest
+    render: Render
 
 
 class SplitSet(Block):
@@ -149,6 +162,9 @@ class TranslatorCell(Block):
     iterations: Count
     weights: LossWeights
     augment: bool = Field(description="augment the contexts during training")
+    schedule: Literal["constant", "cosine"] | None = Field(
+        default=None, description="the cell's own instead of `training.schedule`"
+    )
 
 
 class EmbeddingCell(Block):
@@ -231,10 +247,11 @@ class Discriminator(Block):
 
 
 class RewardWeights(Block):
-    """Weights of a reward's terms, each in units of what standing still costs; 0 leaves a term out."""
+    """Weights of a reward's terms, in units of what standing still costs unless `raw`; 0 leaves one out."""
 
     feature: NonNegative = Field(description="of L_f, the distance of features")
     image: NonNegative = Field(description="of L_i, the distance of pixels: phi where `feature` is 1")
+    raw: bool = Field(default=False, description="the terms in their own units, as in equation 22")
 
     @model_validator(mode="after")
     def _some_term(self) -> "RewardWeights":
@@ -273,6 +290,7 @@ class Imitation(Block):
     dataset: str = Field(description="simulated set whose held-out clips are imitated")
     demonstrations: Count = Field(description="clips that are imitated, the same for every run and method")
     runs: Count = Field(description="contexts, each with a policy of its own")
+    group: Count = Field(description="runs in lockstep: with 2, 15 runs keep 8 cores busy instead of 2")
     iterations: Count
     episodes_per_iteration: Count = Field(
         description="episodes of 49 steps that each run acts in an iteration"
@@ -296,6 +314,25 @@ class Adversarial(Block):
     cells: dict[Name, AdversarialCell]
 
 
+class Evidence(Block):
+    """Pipeline `evidence`: the translators of figure 20, each trained several times, as models of `ours`."""
+
+    translators: list[str] = Field(
+        min_length=2, description="cells of `translators`; the first has every loss, the others lack some"
+    )
+    seeds: list[Annotated[int, Field(ge=0)]] = Field(
+        min_length=1, description="of the trainings, one of each translator for each seed"
+    )
+    iterations: Count = Field(description="of each training, instead of the cell's own")
+    rewards: dict[Name, RewardWeights] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _all_different(self) -> "Evidence":
+        if any(len(set(names)) < len(names) for names in (self.translators, self.seeds)):
+            raise ValueError("a translator or a seed is listed twice")
+        return self
+
+
 class Params(Block):
     """The whole of ``params.yaml``."""
 
@@ -310,6 +347,7 @@ class Params(Block):
     assessment: Assessment
     imitation: Imitation
     adversarial: Adversarial
+    evidence: Evidence
 
     @property
     def methods(self) -> dict[str, DemonstrationCell | EmbeddingRewardCell | AdversarialCell]:
@@ -350,7 +388,7 @@ def load_params(path: Path = Path("params.yaml")) -> Params:
 
 def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
     """Names in ``params`` that must be those of other keys: (dotted key, name, the names that fit)."""
-    sets = [*params.simulate.sets, REAL]
+    sets = [*params.simulate.sets, REAL, RENDERED]
     yield from ((f"split.{name}", name, sets) for name in params.split)
     for block, models in (("translators", params.translators), ("embeddings", params.embeddings)):
         yield from ((f"{block}.{key}.dataset", cell.dataset, sets) for key, cell in models.items())
@@ -358,6 +396,7 @@ def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
     for key, cell in params.imitation.cells.items():
         fitting = params.embeddings if cell.reward == "embedding" else params.translators
         yield f"imitation.cells.{key}.model", cell.model, fitting
+    yield from (("evidence.translators", name, params.translators) for name in params.evidence.translators)
 
 
 def _refuse_twins(params: Params, name: str) -> None:
@@ -366,11 +405,12 @@ def _refuse_twins(params: Params, name: str) -> None:
         ("embeddings", params.embeddings, "translators", params.translators),
         ("adversarial.cells", params.adversarial.cells, "imitation.cells", params.imitation.cells),
         ("simulate.sets", params.simulate.sets, "the clips that stage ingest makes", [REAL]),
+        ("simulate.sets", params.simulate.sets, "the clips that stage render makes", [RENDERED]),
     ):
         for cell in key:
             if cell in taken:
                 raise AnyviewError(f"{name}: {block}.{cell}: the name is taken by {other}")
-    for dataset in (*params.simulate.sets, REAL):
+    for dataset in (*params.simulate.sets, REAL, RENDERED):
         if dataset not in params.split:
             raise AnyviewError(f"{name}: split.{dataset}: missing key")
 

@@ -6,7 +6,8 @@ DATA = Path("data")
 METRICS = Path("metrics")
 REPORT = DATA / "report"
 
-REAL = "real"  # the set of clips that ingest makes; the others are simulated
+REAL = "real"  # the set of clips that ingest makes
+RENDERED = "rendered"  # the set that stage render makes; the others are simulated
 
 
 def raw(source: str) -> Path:
@@ -37,3 +38,8 @@ def translations(cell: str) -> Path:
 def policies(cell: str) -> Path:
     """Policies of a method and how they end."""
     return DATA / "policies" / cell
+
+
+def replicate(translator: str, seed: int, reward: str = "") -> str:
+    """Name of one of several trainings of a translator, and of its policies under a ``reward``."""
+    return f"{translator}-seed-{seed}" + (f"-{reward}" if reward else "")

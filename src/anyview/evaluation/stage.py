@@ -37,7 +37,7 @@ def evaluate_method(name: str, params: Params, method: Method, sources: Sequence
     """
     contexts, _ = sample_contexts(stream(params.base.seed, "evaluation"), params.imitation.runs)
     chosen, demonstrations = imitated_demonstrations(params)
-    groups = groups_of(len(contexts))
+    groups = groups_of(len(contexts), params.imitation.group)
     values, files = _origin(name, params, sources)
     scratch = [checkpoint_folder([*values, index], files) for index in range(len(groups))]
     tasks = [

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from anyview.config import Ingest
+from anyview.ingest.exposure import even_exposure
 from anyview.runtime.errors import AnyviewError
 from anyview.video.manifests import read_table, times_file
 from anyview.video.reading import MAX_RATE, Frame, Video, open_video
@@ -70,7 +71,7 @@ def read_clip(path: Path, limits: Ingest, stretch: Stretch | None = None) -> np.
         raise Refused("damaged: a frame cannot be decoded") from None
     seconds = stretch.end - stretch.start if stretch else limits.frames / limits.rate
     _check_content(frames[fresh], fresh.sum() / seconds)
-    return frames
+    return even_exposure(frames) if limits.even_exposure else frames
 
 
 def sidecar_times(path: Path) -> np.ndarray | None:

@@ -37,7 +37,7 @@ def run_stage(main: Callable[[list[str]], None]) -> NoReturn:
     The process ends when its parent does, so that a killed ``dvc repro`` leaves no orphan behind.
     """
     end_with_parent()
-    signal.signal(signal.SIGTERM, _raise_terminated)
+    raise_when_terminated()
     code = exit_code(lambda: main(sys.argv[1:]), "interrupted: run the same command again to continue")
     if code == INTERRUPTED:
         # Workers end with this process. Python would wait for theirs and for every thread, at worst for ever.
@@ -46,6 +46,11 @@ def run_stage(main: Callable[[list[str]], None]) -> NoReturn:
         sys.stderr.flush()
         os._exit(code)
     sys.exit(code)
+
+
+def raise_when_terminated() -> None:
+    """Let SIGTERM raise ``Terminated`` in the main thread from now on."""
+    signal.signal(signal.SIGTERM, _raise_terminated)
 
 
 def exit_code(action: Callable[[], object], interrupted: str = "interrupted") -> int:

@@ -20,7 +20,8 @@ from anyview.video.pixels import to_input
 
 _OPTIMIZERS: dict[str, MakeOptimizer] = {
     "adam": lambda parameters: torch.optim.Adam(parameters, fused=True),
-    "adadelta": lambda parameters: torch.optim.Adadelta(parameters, foreach=True),
+    # The averages and the constant of TensorFlow, the thesis's framework; PyTorch's own are 0.9 and 1e-6.
+    "adadelta": lambda parameters: torch.optim.Adadelta(parameters, rho=0.95, eps=1e-8, foreach=True),
 }
 
 
@@ -30,7 +31,8 @@ class TranslatorObjective:
     names = ("loss", *NAMES)
 
     def __init__(self, cell: TranslatorCell, training: Training, seed: int, dataset: Dataset):
-        self.cell, self.training, self.seed, self.dataset = cell, training, seed, dataset
+        self.cell, self.seed, self.dataset = cell, seed, dataset
+        self.training = training.model_copy(update={"schedule": cell.schedule or training.schedule})
         self.optimizer = _OPTIMIZERS[cell.optimizer]
         self._augmentation = Augmentation(dataset) if cell.augment else None
 
