@@ -74,7 +74,7 @@ def reached_from(path: Path) -> set[str]:
     return {str(file.relative_to(ROOT)) for file in reached}
 
 
-TESTS_OF_A_WHOLE = {"test_browser.py", "test_resume.py"}
+TESTS_OF_A_WHOLE = {"test_browser.py", "test_kills.py", "test_resume.py"}
 
 MODULES = sorted(SOURCE.rglob("*.py"))
 STAGES = sorted((ROOT / "stages").glob("*.py"))
