@@ -101,10 +101,11 @@ def _tool(rng: np.random.Generator, tilt: float, grip: float, skin: Surface) -> 
         capsule((0.006, 0.010, grip - 0.05), (0.010, 0.034, grip - 0.018), 0.010 * size, skin),
         capsule((-0.008, 0, grip + 0.015), (-0.006, 0, grip + 0.05), 0.024 * size, skin),
     ]
-    fingers = replace(skin, casts_shadow=False)  # the hand's is enough: shadows take half of the time
+    # Ellipsoids take half of the time of capsules; the hand's shadow is enough.
+    fingers = replace(skin, casts_shadow=False)
     for finger in range(4):
         height = grip + 0.02 * size * (finger - 1.7)
-        along_rod.append(capsule((0.017, -0.017, height), (0.017, 0.024, height), 0.0095 * size, fingers))
+        along_rod.append(ellipsoid((0.0105 * size, 0.032, 0.0105 * size), (0.017, 0.0035, height), fingers))
     return [*cup, *moved(along_rod, (-0.004, 0, 0.02), pitch(-tilt))]
 
 

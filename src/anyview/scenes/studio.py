@@ -28,7 +28,7 @@ _XML = f"""
   <statistic extent="1" center="0 0 0"/>
   <visual>
     <global offwidth="{{width}}" offheight="{{height}}"/>
-    <quality offsamples="0" shadowsize="384" numslices="10" numstacks="5" numquads="3"/>
+    <quality offsamples="0" shadowsize="384" numslices="10" numstacks="5" numquads="2"/>
     <map znear="{_NEAR}" zfar="{_FAR}" shadowscale="0.7"/>
   </visual>
   <asset>{{textures}}</asset>
