@@ -96,10 +96,10 @@ class PusherBatch:
         return self.observations()
 
     def observations(self) -> np.ndarray:
-        """(N, O) float32, each entry about in [-1, 1], O = ``observation_size`` of a context.
+        """(N, O) float32, each entry about in [-1, 1], O is ``observation_size``.
 
-        Joint angles (3) and speeds (3), tool position (2) and heading as sine and cosine (2), object (2), goal
-        (2) or both goals in the order of their colours (4), time (1).
+        Joint angles (3) and speeds (3), tool position (2) and heading as sine and cosine (2), object (2),
+        goal (2), or both goals in the order of ``COLOURS`` (4), time (1).
         """
         joints = self._qpos[:, :3]
         tool = tool_pose(joints)
@@ -123,7 +123,7 @@ class PusherBatch:
         return np.linalg.norm(self._qpos[:, 3:] - self._goal, axis=-1)
 
     def other_distance(self) -> np.ndarray:
-        """Metres (N,) from the object's centre to that of the goal that does not count, where there are two."""
+        """Metres (N,) from the object's centre to the goal that does not count, where there are two."""
         others = np.array([c.choice.other_xy for c in self.contexts if c.choice is not None])
         return np.linalg.norm(self._qpos[:, 3:] - others, axis=-1)
 
@@ -142,9 +142,9 @@ def _continued(
     return pushers
 
 
-def observation_size(context: Context) -> int:
-    """Entries of an observation in a context of as many goals."""
-    return OBSERVATION_SIZE + 2 * (len(context.goals) - 1)
+def observation_size(goals: int) -> int:
+    """Entries of an observation where there are one or two ``goals``."""
+    return OBSERVATION_SIZE + 2 * (goals - 1)
 
 
 def finite_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:

@@ -59,7 +59,7 @@ class Distractor:
 
 @dataclass(frozen=True)
 class Choice:
-    """What a context with two goals has besides: the colour of its ``goal_xy``, and the other goal's place."""
+    """What a context with two goals has besides: the colour of ``goal_xy``, and the other goal's place."""
 
     colour: Colour
     other_xy: tuple[float, float]
@@ -69,8 +69,8 @@ class Choice:
 class Context:
     """One setting of the task. Angles in radians, lengths in metres.
 
-    ``goal_xy`` is where a demonstration ends and what success is measured by. Where ``choice`` says that there
-    are two goals, nothing that an agent observes tells them apart.
+    ``goal_xy`` is where a demonstration ends and what success is measured by. Where there are two goals,
+    ``choice`` has the rest, and nothing that an agent observes tells which of them counts.
     """
 
     azimuth: float
@@ -216,7 +216,7 @@ def _propose_two_goals(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray
 def _can_push(
     object_xy: np.ndarray, goal_xy: np.ndarray, arm_qpos: np.ndarray, elbow: np.ndarray
 ) -> np.ndarray:
-    """Whether the expert's way (P,) keeps within reach and workspace, and clear of the object until the push."""
+    """Whether the expert's way (P,) stays in reach and workspace, and off the object until the push."""
     poses = expert_poses(arm_qpos, object_xy, goal_xy)
     inside = _distance(poses[..., :2], ARENA_CENTRE).max(-1) < WORKSPACE_RADIUS
     possible = inside & (clearance(poses, object_xy) > APPROACH_CLEARANCE)
@@ -254,9 +254,7 @@ def _pair(place: np.ndarray) -> tuple[float, float]:
     return float(place[0]), float(place[1])
 
 
-def _distractor(
-    rng: np.random.Generator, places: list[np.ndarray], colours: Sequence[Colour]
-) -> Distractor:
+def _distractor(rng: np.random.Generator, places: list[np.ndarray], colours: Sequence[Colour]) -> Distractor:
     """A distractor away from ``places``, and from the object's colour and those of the goals, ``colours``."""
     while True:
         position = _in_disc(rng, _DISTRACTOR_RADIUS, 1)[0]

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -13,7 +14,7 @@ from anyview.training.augmentation import Augmentation
 from anyview.training.common.batches import FramePairs, training_pairs, validation_pairs
 from anyview.training.common.optimization import MakeOptimizer
 from anyview.translator.losses import NAMES, Losses, batch_losses
-from anyview.translator.network import ContextTranslator
+from anyview.translator.network import ContextTranslator, task_frames
 from anyview.translator.weights import save_translator
 from anyview.video.datasets import Dataset
 from anyview.video.pixels import to_input
@@ -38,7 +39,9 @@ class TranslatorObjective:
         """With the same first weights for every cell of an architecture: ablations differ in losses alone."""
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(torch_seed(self.seed, "translator/weights"))
-            model = ContextTranslator(self.cell.architecture, self.dataset.image_size)
+            model = ContextTranslator(
+                self.cell.architecture, self.dataset.image_size, self.cell.task_embedding
+            )
         return model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
     def batch(self, iteration: int) -> FramePairs:
@@ -49,17 +52,19 @@ class TranslatorObjective:
     def losses(self, model: ContextTranslator, pairs: FramePairs, iteration: int, part: int) -> Tensor:
         """(4,), with dropout and augmentation."""
         device = next(model.parameters()).device
-        paired, context = self._frames(pairs, device)
+        paired, context, clip = self._frames(pairs, device)
         if self._augmentation is not None:
             rng = stream(self.seed, "translator/augmentation", iteration, part)
             expert, target = paired.chunk(2)
-            (expert,) = self._augmentation(expert[None], pairs.sources, rng)
+            shown = expert[None] if clip is None else torch.cat((expert[None], clip.transpose(0, 1)))
+            expert, *others = self._augmentation(shown, pairs.sources, rng)
+            clip = torch.stack(others, dim=1) if others else None
             context, target = self._augmentation(torch.stack((context, target)), pairs.targets, rng)
             paired = torch.cat((expert, target))
         seed = torch_seed(self.seed, "translator/dropout", iteration, part)
         noise = torch.Generator(device).manual_seed(seed)
         with products_in(self.training.precision, device):
-            losses = batch_losses(model, paired, context, self.cell.weights, noise)
+            losses = batch_losses(model, paired, context, clip, self.cell.weights, noise)
         return torch.stack((losses.total(self.cell.weights), *losses.parts()))
 
     def validation(self) -> list[FramePairs]:
@@ -84,7 +89,13 @@ class TranslatorObjective:
         """Write a model folder."""
         save_translator(folder, model, meta)
 
-    def _frames(self, pairs: FramePairs, device: torch.device) -> tuple[Tensor, Tensor]:
-        """o_t^i and after them o_t^j (2N, 3, H, W), and o_0^j (N, 3, H, W)."""
-        paired, context = pairs.frames(self.dataset), pairs.contexts(self.dataset)
-        return tuple(to_input(torch.from_numpy(frames).to(device)) for frames in (paired, context))  # type: ignore[return-value]
+    def _frames(self, pairs: FramePairs, device: torch.device) -> tuple[Tensor, Tensor, Tensor | None]:
+        """o_t^i, then o_t^j (2N, 3, H, W); o_0^j (N, 3, H, W); frames to embed of the clips i (N, K, 3, H, W)."""
+
+        def load(frames: np.ndarray) -> Tensor:
+            return to_input(torch.from_numpy(frames).to(device))
+
+        clip = None
+        if self.cell.task_embedding:
+            clip = load(pairs.clips(self.dataset, task_frames(self.dataset.length)))
+        return load(pairs.frames(self.dataset)), load(pairs.contexts(self.dataset)), clip
