@@ -20,7 +20,7 @@ COMPILE := pip-compile --quiet --generate-hashes --strip-extras --build-deps-for
 	--no-emit-index-url --no-emit-find-links --no-emit-options --pip-args "$(PIP_ARGS)"
 GL_PACKAGES := libegl1 libopengl0 libgl1-mesa-dri libosmesa6
 
-.PHONY: help repro test test-slow lint format bench setup setup-dev lock audit clean
+.PHONY: help repro beyond test test-slow lint format bench setup setup-dev lock audit clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1|/p' Makefile | awk -F'|' '{printf "  make %-10s %s\n", $$1, $$2}'
@@ -28,6 +28,10 @@ help: ## list the targets
 repro: .setup-stamp .setup-stamp-graphics ## run the whole pipeline; only what changed runs again
 	python stages/check.py
 	dvc repro
+
+beyond: .setup-stamp .setup-stamp-graphics ## run what goes beyond the thesis as well, and what it needs of the rest
+	python stages/check.py
+	dvc repro --recursive beyond
 
 test: lint .setup-stamp-graphics ## lint, type check and the fast tests
 	python -m pytest

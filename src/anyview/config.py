@@ -354,6 +354,20 @@ class Params(Block):
         """Every translator, of the thesis and beyond."""
         return {**self.translators, **self.beyond.translators}
 
+    def going_beyond(self, *beside: str) -> "Params":
+        """These params with the sets and cells of `beyond`, and methods ``beside`` them, for the thesis's."""
+        cells = {**self.beyond.cells, **{name: self.imitation.cells[name] for name in beside}}
+        return self.model_copy(
+            update={
+                "simulate": self.simulate.model_copy(update={"sets": self.beyond.sets}),
+                "split": self.beyond.split,
+                "translators": self.beyond.translators,
+                "embeddings": {},
+                "imitation": self.imitation.model_copy(update={"cells": cells}),
+                "adversarial": self.adversarial.model_copy(update={"cells": {}}),
+            }
+        )
+
     def imitating(self, name: str) -> "Params":
         """These params with the cell ``name`` of `beyond` as one of `imitation`, which has its clips."""
         cell = self.beyond.cells[name]

@@ -90,7 +90,7 @@ class TranslatorObjective:
         save_translator(folder, model, meta)
 
     def _frames(self, pairs: FramePairs, device: torch.device) -> tuple[Tensor, Tensor, Tensor | None]:
-        """o_t^i, then o_t^j (2N, 3, H, W); o_0^j (N, 3, H, W); frames to embed of the clips i (N, K, 3, H, W)."""
+        """o_t^i, o_t^j (2N, 3, H, W); o_0^j (N, 3, H, W); frames of the clips i to embed (N, K, 3, H, W)."""
 
         def load(frames: np.ndarray) -> Tensor:
             return to_input(torch.from_numpy(frames).to(device))
