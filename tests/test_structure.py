@@ -18,6 +18,7 @@ from anyview.config import load_params
 
 ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "src"
+BEYOND = "beyond/dvc.yaml"
 
 # Code that serves a stage without changing what it makes: an edit of it must not retrain anything.
 WITHOUT_EFFECT_ON_RESULTS = ("src/anyview/config.py", "src/anyview/paths.py", "src/anyview/runtime/")
@@ -108,7 +109,7 @@ def test_every_import_is_declared():
 
 @cache
 def declared() -> dict[str, tuple[set[str], set[str]]]:
-    """dvc.yaml as DVC reads it: address of a stage -> (dependencies, outputs), relative to the root."""
+    """Both pipelines as DVC reads them: address of a stage -> (dependencies, outputs), relative to the root."""
     with Repo(str(ROOT)) as repo:
         return {
             stage.addressing: (
@@ -123,18 +124,27 @@ def declared() -> dict[str, tuple[set[str], set[str]]]:
         }
 
 
+def stage_of(address: str) -> str:
+    """`train` of ``train@sim``, and of ``beyond/dvc.yaml:train@sim-choice``."""
+    return address.rpartition(":")[2].partition("@")[0]
+
+
 def code_of(stage: str) -> dict[str, set[str]]:
     """Code that the cells of ``stage`` declare, files and folders."""
-    cells = {name: deps for name, (deps, _) in declared().items() if name.split("@")[0] == stage}
+    cells = {name: deps for name, (deps, _) in declared().items() if stage_of(name) == stage}
     assert cells, f"{stage}: not in dvc.yaml"
-    other = ("data/", "params.yaml", "stages/pipeline.yaml")
+    other = ("data/", "params.yaml", "stages/pipeline.yaml", "stages/beyond.yaml")
     return {name: {dep for dep in deps if not dep.startswith(other)} for name, deps in cells.items()}
 
 
 def test_the_report_depends_on_the_pipeline_that_it_draws():
-    """By a link: DVC does not take dvc.yaml itself for a dependency."""
-    assert "stages/pipeline.yaml" in declared()["report"][0]
-    assert (ROOT / "stages/pipeline.yaml").resolve() == ROOT / "dvc.yaml"
+    """By a link: DVC does not take a dvc.yaml itself for a dependency."""
+    for report, link, pipeline in (
+        ("report", "stages/pipeline.yaml", "dvc.yaml"),
+        (f"{BEYOND}:report", "stages/beyond.yaml", BEYOND),
+    ):
+        assert link in declared()[report][0]
+        assert (ROOT / link).resolve() == ROOT / pipeline
 
 
 def covers(dependency: str, file: str) -> bool:
@@ -176,24 +186,25 @@ def rerun_by(file: str) -> set[str]:
 
 def test_an_edit_reruns_no_more_than_it_must():
     """Where a rerun takes minutes, dependencies are finer than folders."""
-    learners = {name: cell.learner for name, cell in load_params(ROOT / "params.yaml").methods.items()}
+    params = load_params(ROOT / "params.yaml")
+    learners = {name: cell.learner for name, cell in {**params.methods, **params.beyond.cells}.items()}
     for learner, other in (("ddpg", "trpo"), ("trpo", "ddpg")):
         again = {name.partition("@")[2] for name in rerun_by(f"src/anyview/learners/{learner}.py")} - {""}
         assert {learners[name] for name in again} == {learner}
         assert other not in {learners[name] for name in again}
     for reward in ("gail", "tpil"):
         assert rerun_by(f"src/anyview/adversarial/{reward}.py") == {f"discriminate@{reward}", "report"}
-    embedded = {name.split("@")[0] for name in rerun_by("src/anyview/training/embedding.py")}
+    embedded = {stage_of(name) for name in rerun_by("src/anyview/training/embedding.py")}
     assert embedded == {"embed", "imitate", "report"}
-    assert not {name for name in rerun_by("src/anyview/training/translator.py") if name.startswith("embed@")}
+    assert "embed" not in {stage_of(name) for name in rerun_by("src/anyview/training/translator.py")}
     assessed = rerun_by("src/anyview/assessment/similarity.py")
-    assert {name.split("@")[0] for name in assessed} == {"translate", "report"}
+    assert {stage_of(name) for name in assessed} == {"translate", "report"}
     for folder in ("report", "analysis"):
-        assert rerun_by(f"src/anyview/{folder}/__init__.py") == {"report"}
+        assert rerun_by(f"src/anyview/{folder}/__init__.py") == {"report", f"{BEYOND}:report"}
 
 
 def test_every_stage_has_a_script_and_every_script_a_stage():
-    assert {name.split("@")[0] for name in declared()} == {path.stem for path in STAGES}
+    assert {stage_of(name) for name in declared()} == {path.stem for path in STAGES}
 
 
 def test_cells_are_those_of_params():
@@ -202,6 +213,15 @@ def test_cells_are_those_of_params():
     for address in declared():
         stage, _, cell = address.partition("@")
         cells.setdefault(stage, set()).add(cell)
+    beyond = params.beyond
+    for stage, named in (
+        ("simulate", beyond.sets),
+        ("split", beyond.split),
+        ("train", beyond.translators),
+        ("translate", beyond.translators),
+        ("imitate", beyond.cells),
+    ):
+        assert cells[f"{BEYOND}:{stage}"] == set(named)
     assert cells["simulate"] == set(params.simulate.sets)
     assert cells["split"] == set(params.split)
     assert cells["train"] == cells["translate"] == set(params.translators)
@@ -210,12 +230,26 @@ def test_cells_are_those_of_params():
     assert cells["discriminate"] == set(params.adversarial.cells)
 
 
-def test_the_report_reads_every_cell():
+@pytest.mark.parametrize(("pipeline", "report"), [("", "report"), (f"{BEYOND}:", f"{BEYOND}:report")])
+def test_the_report_reads_every_cell(pipeline, report):
     """Its inputs are written out one by one: none may be forgotten, and none may be left over."""
-    outputs = {out for address, (_, outs) in declared().items() if address != "report" for out in outs}
-    data = {dep for dep in declared()["report"][0] if dep.startswith("data/")}
+    outputs = {
+        out
+        for address, (_, outs) in declared().items()
+        if address != report and address.startswith(pipeline) and (pipeline or BEYOND not in address)
+        for out in outs
+    }
+    data = {dep for dep in declared()[report][0] if dep.startswith("data/")}
     assert outputs - data <= {"data/raw/surrogate"}
-    assert data <= outputs
+    assert data - outputs <= ({"data/policies/ours"} if pipeline else set())
+
+
+def test_the_study_of_the_thesis_needs_nothing_beyond_it():
+    """`dvc repro` runs dvc.yaml and what that needs: none of beyond/dvc.yaml."""
+    beyond = {out for address, (_, outs) in declared().items() if address.startswith(BEYOND) for out in outs}
+    assert beyond
+    for address, (deps, _) in declared().items():
+        assert address.startswith(BEYOND) or not deps & beyond, address
 
 
 def test_outputs_are_one_folder_or_table_a_cell():

@@ -471,7 +471,7 @@ def _explain(error: ValidationError) -> str:
         message = first["msg"].removeprefix("Value error, ")
         if first["type"].startswith("union_tag"):
             key += ".reward"
-            message = "Input should be 'translated', 'true' or 'embedding'"
+            message = "Input should be 'translated', 'true', 'clock' or 'embedding'"
         if not isinstance(first["input"], dict | list | set):  # aliases can make these endless
             message += f", got {_brief(first['input'])}"
     return f"{key}: {message}" + (f" (and {len(others)} more)" if others else "")

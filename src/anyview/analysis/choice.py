@@ -44,8 +44,8 @@ def against_choice(methods: Methods, estimator: Estimator) -> pd.DataFrame:
     """Every method against `choice`, run by run: the same context, the same goal shown.
 
     ``cell, runs, value, low, high``: mean paired difference of the distance to the shown goal in metres
-    (above 0: farther than `choice`), both runs of a context drawn together. ``only_choice, only_other``: runs in
-    which one alone ends at the shown goal; ``p`` of McNemar's test. No rows where `choice` was not run.
+    (above 0: farther than `choice`), both runs of a context drawn together. ``only_choice, only_other``: runs
+    in which one alone ends at the shown goal; ``p`` of McNemar's test. No rows where `choice` was not run.
     """
     rows = []
     compared = choosing(methods)

@@ -42,7 +42,9 @@ def evaluate_method(name: str, params: Params, method: Method, sources: Sequence
     imitated = _imitated(name, params)
     numbers = groups_of(params.imitation.runs)
     values, files = _origin(name, params, sources)
-    tasks, acted, shown = [], [], []
+    tasks: list[tuple[Any, ...]] = []
+    acted: list[Context] = []
+    shown = []
     for choice, contexts, clips in imitated:
         for group in numbers:
             runs = [len(acted) + run for run in group]

@@ -13,7 +13,7 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -82,6 +82,7 @@ class Context:
 
     def __post_init__(self) -> None:
         """Raises ValueError if an angle or a place is none that physics can start from."""
+        parts: list[tuple[str, Any, tuple[int, ...]]]
         parts = [("azimuth", self.azimuth, ()), ("arm_qpos", self.arm_qpos, (3,))]
         parts += [(f"{name}_xy", getattr(self, f"{name}_xy"), (2,)) for name in ("object", "goal")]
         if self.choice is not None:
@@ -182,8 +183,8 @@ def _propose_two_goals(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray
     object_xy = _in_disc(rng, ARENA_RADIUS, _PLACES)
     goals = np.stack([_in_disc(rng, ARENA_RADIUS, _PLACES) for _ in range(2)], axis=1)
     elbow = rng.choice([-1.0, 1.0], _PLACES)
-    keep = _distance(goals[:, 0], goals[:, 1]) >= SEPARATION
-    keep &= (_distance(goals, object_xy[:, None]) >= SEPARATION).all(-1)
+    apart = np.stack([_distance(goals[:, 0], goals[:, 1]), *_distance(goals, object_xy[:, None]).T])
+    keep = (apart >= SEPARATION).all(0)
     object_xy, goals, elbow = object_xy[keep], goals[keep], elbow[keep]
     # First the pushes by themselves, and of these first the ends: most places fail there.
     for goal in range(2):
