@@ -18,9 +18,10 @@ INSTALL := python -m pip install --quiet
 COMPILE := pip-compile --quiet --generate-hashes --strip-extras --build-deps-for editable \
 	--unsafe-package pip --unsafe-package torch \
 	--no-emit-index-url --no-emit-find-links --no-emit-options --pip-args "$(PIP_ARGS)"
+PARALLEL := --numprocesses logical --maxprocesses 4 --dist loadgroup # see tests/conftest.py
 GL_PACKAGES := libegl1 libopengl0 libgl1-mesa-dri libosmesa6
 
-.PHONY: help repro beyond test test-slow lint format bench setup setup-dev lock audit clean
+.PHONY: help repro beyond evidence test test-slow lint format bench setup setup-dev lock audit clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1|/p' Makefile | awk -F'|' '{printf "  make %-10s %s\n", $$1, $$2}'
@@ -30,14 +31,18 @@ repro: .setup-stamp .setup-stamp-graphics ## run the whole pipeline; only what c
 	dvc repro
 
 beyond: .setup-stamp .setup-stamp-graphics ## run what goes beyond the thesis as well, and what it needs of the rest
-	python stages/check.py
-	dvc repro --recursive beyond
+	dvc repro check simulate@diverse split@diverse train@sim imitate@ours
+	cd beyond && dvc repro
+
+evidence: .setup-stamp .setup-stamp-graphics ## figure 20 with six translators of each loss: hours, see evidence/dvc.yaml
+	dvc repro check simulate@diverse split@diverse
+	cd evidence && dvc repro && python report.py
 
 test: lint .setup-stamp-graphics ## lint, type check and the fast tests
-	python -m pytest
+	python -m pytest $(PARALLEL)
 
 test-slow: .setup-stamp-dev .setup-stamp-graphics .setup-stamp-browser ## kills, clusters, browsers, queues: minutes each
-	python -m pytest -m slow --durations=12
+	python -m pytest $(PARALLEL) -m slow --durations=12
 
 lint: .setup-stamp-dev ## ruff, mypy and who may import whom
 	ruff check .
@@ -58,7 +63,7 @@ setup-dev: .setup-stamp-dev .setup-stamp-graphics ## the same, with the tools th
 
 lock: .setup-stamp-dev ## pin every dependency but PyTorch again, with hashes (UPGRADE=--upgrade for newer ones)
 	CUSTOM_COMPILE_COMMAND="make lock" $(COMPILE) $(UPGRADE) --output-file requirements.lock pyproject.toml
-	CUSTOM_COMPILE_COMMAND="make lock" $(COMPILE) $(UPGRADE) --extra dev --extra cluster \
+	CUSTOM_COMPILE_COMMAND="make lock" $(COMPILE) $(UPGRADE) --extra dev --extra cluster --extra lerobot \
 		--constraint requirements.lock --output-file requirements-dev.lock pyproject.toml
 	@! grep -nE '://|^(-|nvidia)' requirements.lock requirements-dev.lock
 

@@ -117,7 +117,7 @@ def raw_clip(name: str, codec: str, sides: bytes, claimed: bytes) -> Callable[[P
         from anyview.config import Ingest
         from anyview.ingest.clips import Candidate, ingest_clip
 
-        limits = Ingest(size=48, frames=80, rate=10.0, max_megabytes=50.0)
+        limits = Ingest(size=48, frames=80, rate=10.0, max_megabytes=50.0, even_exposure=False)
         writer = cv2.VideoWriter(
             str(box / name), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*codec), 10.0, (160, 90)
         )
@@ -181,6 +181,30 @@ def stored_set(name: str) -> Callable[[Path], Target]:
         forged = (b"file,clips,frames,sha256\nshard-0000.avi,1000000000,1000000000," + digest + b"\n", PICKLE)
         notices = {"shard-0000.avi": ANY, "files.csv": BROKEN}.get(name, frozenset(("emptied",)))
         return Target(box / name, lambda: open_frames(box).frames.shape, forged, notices)
+
+    return make
+
+
+def shared_dataset(file: str) -> Callable[[Path], Target]:
+    """The description, or the episode table, of a LeRobotDataset."""
+
+    def make(box: Path) -> Target:
+        from anyview.lerobot.layout import VIDEOS
+        from anyview.lerobot.reading import episode_views
+        from anyview.lerobot.writing import write_dataset
+
+        camera = "observation.images.top"
+        write_dataset(box, pictures()[None, :4], np.zeros((20, 1), int), ["top"], 10.0, "push")
+        described = json.loads((box / "meta" / "info.json").read_text())
+        forged: tuple[bytes, ...] = (PICKLE, b"PAR1" + PICKLE + b"PAR1", b'{"a":' * 100_000)
+        for path in ("../../etc/passwd", "{video_key.__class__}", "{chunk_index:999999999}", 7):
+            forged += (json.dumps(described | {"video_path": path}).encode(),)
+
+        def read() -> object:
+            files = set(episode_views(box, [camera])["file"])
+            return files == {VIDEOS.format(video_key=camera, chunk_index=0, file_index=0)}
+
+        return Target(box / file, read, forged, BROKEN)
 
     return make
 
@@ -282,6 +306,8 @@ TARGETS: dict[str, Callable[[Path], Target]] = {
     "set: files.csv": stored_set("files.csv"),
     "set: manifest.csv": stored_set("manifest.csv"),
     "split": table("split.csv"),
+    "LeRobotDataset: info.json": shared_dataset("meta/info.json"),
+    "LeRobotDataset: episodes": shared_dataset("meta/episodes/chunk-000/file-000.parquet"),
     "params.yaml": params_file,
     "translator: weights": model("weights.safetensors", "translator"),
     "translator: model.json": model("model.json", "translator"),

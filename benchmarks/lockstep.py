@@ -123,7 +123,7 @@ def replay_seconds(params: Params, runs: int) -> float:
 def lockstep_rate(params: Params, contexts: list[Context]) -> float:
     """Steps per second of 15 runs in groups on two workers, setting up left out."""
     os.environ["ANYVIEW_WORKERS"] = "2"
-    groups = groups_of(len(contexts))
+    groups = groups_of(len(contexts), params.imitation.group)
     tasks = [(params, group, [contexts[run] for run in group]) for group in groups]
     return sum(steps / sum(watch.parts.values()) for steps, watch in run_tasks(train_group, tasks))
 

@@ -27,7 +27,7 @@ from torch import Tensor
 from torch.nn import functional as F
 from torch.utils.flop_counter import FlopCounterMode
 
-from anyview.config import LossWeights, Training, TranslatorCell
+from anyview.config import LossWeights, Pretraining, Training, TranslatorCell
 from anyview.runtime.device import worker_count
 from anyview.seeds import torch_seed
 from anyview.training.common.fit import update, validate
@@ -68,6 +68,7 @@ def make_objective(architecture: str, dataset: Dataset, seed: int = 0) -> Transl
         optimizer="adam",
         iterations=1000,
         weights=ONE,
+        pretraining=Pretraining(dataset="diverse", iterations=0),
         augment=False,
     )
     training = Training(

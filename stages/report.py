@@ -44,7 +44,7 @@ def report_beyond(params: Params) -> None:
     illustrations = illustrate_beyond(study, results)
     text = write_beyond(study, results, illustrations, picture=lambda name: "")
     with_pictures = write_beyond(study, results, illustrations, picture)
-    page = render_page(with_pictures, illustrations, study, read_yaml(Path("beyond/dvc.yaml")))
+    page = render_page(with_pictures, illustrations, study, read_yaml(Path("dvc.yaml")))
     write_report(BEYOND, text, page, illustrations)
     write_metrics(METRICS, {"beyond": tree})
 

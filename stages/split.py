@@ -19,6 +19,8 @@ def main(arguments: list[str]) -> None:
     train, validation = params.splits[name].train, params.splits[name].validation
     if name == paths.REAL:
         clips = read_table(manifest, ["clip", "pair", "kind"], unique="clip")
+    elif name == paths.RENDERED:
+        clips = read_table(manifest, ["clip", "pair"], unique="clip").assign(kind="standard")
     else:  # a simulated demonstration is seen from one viewpoint: each is a pair of its own
         clips = read_table(manifest, ["clip"], unique="clip")
         clips = clips.assign(pair=clips["clip"], kind="standard")

@@ -16,7 +16,10 @@ def main(arguments: list[str]) -> None:
     params = load_params()
     name = choose(arguments, params.translator_cells, "python stages/train.py CELL")
     cell = params.translator_cells[name]
-    objective = TranslatorObjective(cell, params.training, params.base.seed, open_dataset(cell.dataset))
+    pretraining = open_dataset(cell.pretraining.dataset) if cell.pretraining.iterations else None
+    objective = TranslatorObjective(
+        cell, params.training, params.base.seed, open_dataset(cell.dataset), pretraining
+    )
     fit(name, objective, paths.model(name))
 
 

@@ -24,6 +24,14 @@ load_mujoco()
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests of one file go to one process, and those that need the whole pipeline all to the first."""
+    for item in items:
+        group = "pipeline" if "smoke" in getattr(item, "fixturenames", ()) else str(item.path)
+        item.add_marker(pytest.mark.xdist_group(group))
+    items.sort(key=lambda item: "smoke" not in getattr(item, "fixturenames", ()))  # the longest first
+
+
 @pytest.fixture(scope="session")
 def root() -> Path:
     """The root of the repository."""
@@ -48,9 +56,9 @@ def copy_of_the_repository(folder: Path) -> Path:
 
     new = [name for name in listed("--others") if not name.startswith("data/")]  # data is DVC's
     for name in [*listed("--cached"), *new]:
-        if (ROOT / name).is_file():
+        if (ROOT / name).is_file() or (ROOT / name).is_symlink():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(ROOT / name, folder / name)
+            shutil.copy2(ROOT / name, folder / name, follow_symlinks=False)
     git = [
         "git",
         "-c",
@@ -100,7 +108,8 @@ class Study:
 
     def copy(self, folder: Path) -> "Study":
         """The same study in the new ``folder``, with an empty scratch folder."""
-        shutil.copytree(self.folder, folder / "study", ignore=shutil.ignore_patterns(".venv", "tmp"))
+        left_out = shutil.ignore_patterns(".venv", "tmp")
+        shutil.copytree(self.folder, folder / "study", symlinks=True, ignore=left_out)
         return Study(folder / "study", folder / "scratch")
 
 

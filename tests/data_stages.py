@@ -33,7 +33,14 @@ KERNELS = (
     ),
     *("log", "log2", "log10", "log1p", "cbrt", "power", "float_power"),
 )
-STAGES = ("simulate diverse", "simulate narrow", "film", "ingest", "split diverse", "split real")
+STAGES = (
+    "simulate diverse",
+    "simulate narrow",
+    "film",
+    "render",
+    "ingest",
+    *("split diverse", "split real", "split rendered"),
+)
 
 
 def next_larger(kernel: Callable[..., Any]) -> Callable[..., Any]:

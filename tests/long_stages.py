@@ -24,6 +24,7 @@ LONG_STAGES = {
     "film": LongStage(
         ["stages/film.py"], "data/raw/surrogate", {"real.film.pairs": 4, "real.film.extreme_pairs": 1}
     ),
+    "render": LongStage(["stages/render.py"], "data/clips/rendered", {"real.render.demonstrations": 60}),
     "ingest": LongStage(["stages/ingest.py"], "data/clips/real", {"real.ingest.frames": 60}),
     "train": LongStage(
         ["stages/train.py", "sim"],

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from anyview.config import LossWeights, Training, TranslatorCell
+from anyview.config import LossWeights, Pretraining, Training, TranslatorCell
 from anyview.training.translator import TranslatorObjective
 from anyview.video.datasets import Dataset
 from anyview.video.sets import write_clips, write_set
@@ -38,6 +38,7 @@ def make_objective(discs) -> Callable[..., TranslatorObjective]:
             "optimizer": "adam",
             "iterations": 6,
             "weights": LossWeights(**weights | changes.pop("weights", {})),
+            "pretraining": Pretraining(dataset="diverse", iterations=0),
             "augment": False,
         }
         shared = {name: changes.pop(name) for name in list(changes) if name in training}

@@ -64,7 +64,7 @@ class Data:
         folder = self._folder("clips", "real")
         clips = [f"clip-{index:03d}" for index in range(12)]
         self._csv(folder / "manifest.csv", clip=clips, file=[f"{clip}.avi" for clip in clips])
-        self._csv(folder / "refused.csv", file=["dark.avi"], reason=["too dark"])
+        self._csv(folder / "refused.csv", file=["dark.avi"], pair=["dark"], reason=["too dark"])
         places = ["train"] * 6 + ["validation"] * 4 + ["extreme"] * 2
         pairs = [f"pair-{index // 2}" for index in range(12)]
         self._csv(self._folder("splits") / "real.csv", clip=clips, pair=pairs, split=places)

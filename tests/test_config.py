@@ -97,6 +97,11 @@ def test_the_committed_params_are_sound():
         ),
         ("simulate.sets", {"wide": {"contexts": "diverse", "demos": 4}}, "split.wide: missing key"),
         (
+            "simulate.sets.rendered",
+            {"contexts": "diverse", "demos": 4},
+            "simulate.sets.rendered: the name is taken by the clips that stage render makes",
+        ),
+        (
             "simulate.sets.real",
             {"contexts": "diverse", "demos": 4},
             "simulate.sets.real: the name is taken by the clips that stage ingest makes",
@@ -167,6 +172,12 @@ def test_the_committed_params_are_sound():
             "gail",
             "imitation.cells.ours.reward: Input should be 'translated', 'true', 'clock' or 'embedding'",
         ),
+        (
+            "evidence.translators",
+            ["sim", "tcn"],
+            "evidence.translators: 'tcn' is none of these: real-adam, ",
+        ),
+        ("evidence.seeds", [1, 2, 1], "evidence: a translator or a seed is listed twice"),
         ("real.ingest.frames", 10**6, "real.ingest.frames: Input should be less than or equal to 10000"),
     ],
 )

@@ -1,10 +1,12 @@
 """Clips of one's own, of mixed formats and lengths, from a folder of files to a queued experiment."""
 
+import json
 import subprocess
 import sys
 import time
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from tests.conftest import Study, copy_of_the_repository
@@ -30,16 +32,37 @@ def put_clips(folder: Path) -> None:
         encode(folder / file, film(before, task, after, fps, seed=index), codec, fps, options=options)
 
 
-@pytest.mark.slow
-def test_clips_under_dvc_are_found_by_a_queued_experiment(tmp_path):
+@pytest.fixture
+def study(tmp_path) -> Study:
+    """The `smoke` profile with clips under DVC, listed by the proposed manifest."""
     study = Study(copy_of_the_repository(tmp_path / "study"), tmp_path / "scratch")
     raw = study.folder / "data" / "raw" / "recorded"
     put_clips(raw)
+    study.run("anyview", "profile", "smoke")
     study.run("anyview", "clips", "--propose")
     (raw / "manifest.proposed.csv").rename(raw / "manifest.csv")
     study.run("dvc", "add", "data/raw/recorded")
     study.run("git", "add", "-A")
     study.run("git", "-c", "user.name=test", "-c", "user.email=test@example.org", "commit", "-qm", "clips")
+    return study
+
+
+@pytest.mark.slow
+def test_an_experiment_trains_a_translator_on_them(study):
+    study.run("dvc", "exp", "run", "-n", "mine", "-S", "real.source=recorded", "translate@real-adam")
+    found = json.loads(study.run("anyview", "clips", "--json"))
+    assert (found["source"], found["refused"]) == ("recorded", [])
+    assert found["sets"]["real"]["train"] >= 2
+    assert found["sets"]["real"]["validation"] >= 2
+    assert sum(found["sets"]["real"].values()) == len(VIEWS)
+    clips = study.folder / "data" / "clips" / "real"
+    listed = pd.read_csv(clips / "manifest.csv")
+    assert sorted(listed["pair"]) == ["push1", "push1", "push2", "push2", "push3", "push3"]
+    assert list((study.folder / "data" / "translations" / "real-adam").glob("*.csv"))
+
+
+@pytest.mark.slow
+def test_clips_under_dvc_are_found_by_a_queued_experiment(study):
     study.run("dvc", "exp", "run", "--queue", "-n", "mine", "-S", "real.source=recorded", "ingest")
     study.run("bash", "-c", "dvc queue start > /dev/null 2>&1")
     deadline = time.monotonic() + 300

@@ -19,6 +19,8 @@ SMALLEST = {
     "real.film.singles": 1,
     "real.film.extreme_pairs": 0,
     "real.film.width": 160,
+    "real.render.demonstrations": 3,
+    "real.render.moments": 2,
 }
 
 

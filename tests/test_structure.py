@@ -18,7 +18,6 @@ from anyview.config import load_params
 
 ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "src"
-BEYOND = "beyond/dvc.yaml"
 
 # Code that serves a stage without changing what it makes: an edit of it must not retrain anything.
 WITHOUT_EFFECT_ON_RESULTS = ("src/anyview/config.py", "src/anyview/paths.py", "src/anyview/runtime/")
@@ -75,10 +74,12 @@ def reached_from(path: Path) -> set[str]:
     return {str(file.relative_to(ROOT)) for file in reached}
 
 
-TESTS_OF_A_WHOLE = {"test_browser.py", "test_resume.py"}
+TESTS_OF_A_WHOLE = {"test_browser.py", "test_kills.py", "test_resume.py"}
 
 MODULES = sorted(SOURCE.rglob("*.py"))
 STAGES = sorted((ROOT / "stages").glob("*.py"))
+# DVC repositories of their own, with links to params, code and what they need of the study.
+EVIDENCE, BEYOND = ROOT / "evidence", ROOT / "beyond"
 
 
 def test_imports_point_one_way():
@@ -102,49 +103,42 @@ def test_every_import_is_declared():
     owners = {
         name: {dist.lower().replace("_", "-") for dist in distributions.get(name, [name])} for name in used
     }
-    optional = names(project["optional-dependencies"]["cluster"])
+    extras = project["optional-dependencies"]
+    optional = names([*extras["cluster"], *extras["lerobot"]])
     assert {name for name, found in owners.items() if not found & (required | optional)} == set()
-    assert required - set().union(*owners.values()) == {"dvc"}  # which is run, not imported
+    assert required - set().union(*owners.values()) == set()
 
 
 @cache
-def declared() -> dict[str, tuple[set[str], set[str]]]:
-    """Both pipelines as DVC reads them: address of a stage -> (dependencies, outputs), relative to the root."""
-    with Repo(str(ROOT)) as repo:
+def declared(folder: Path = ROOT) -> dict[str, tuple[set[str], set[str]]]:
+    """A dvc.yaml as DVC reads it: address of a stage -> (dependencies, outputs), relative to its folder."""
+    with Repo(str(folder)) as repo:
         return {
-            stage.addressing: (
+            stage.name: (
                 {
-                    str(Path(dep.fs_path).relative_to(ROOT))
+                    str(Path(dep.fs_path).relative_to(folder))
                     for dep in stage.deps
                     if not isinstance(dep, ParamsDependency)
                 },
-                {str(Path(out.fs_path).relative_to(ROOT)) for out in stage.outs},
+                {str(Path(out.fs_path).relative_to(folder)) for out in stage.outs},
             )
             for stage in repo.index.stages
         }
 
 
-def stage_of(address: str) -> str:
-    """`train` of ``train@sim``, and of ``beyond/dvc.yaml:train@sim-choice``."""
-    return address.rpartition(":")[2].partition("@")[0]
-
-
-def code_of(stage: str) -> dict[str, set[str]]:
+def code_of(stage: str, folder: Path) -> dict[str, set[str]]:
     """Code that the cells of ``stage`` declare, files and folders."""
-    cells = {name: deps for name, (deps, _) in declared().items() if stage_of(name) == stage}
+    cells = {name: deps for name, (deps, _) in declared(folder).items() if name.split("@")[0] == stage}
     assert cells, f"{stage}: not in dvc.yaml"
-    other = ("data/", "params.yaml", "stages/pipeline.yaml", "stages/beyond.yaml")
+    other = ("data/", "params.yaml", "stages/pipeline.yaml", "pipeline.yaml")
     return {name: {dep for dep in deps if not dep.startswith(other)} for name, deps in cells.items()}
 
 
 def test_the_report_depends_on_the_pipeline_that_it_draws():
     """By a link: DVC does not take a dvc.yaml itself for a dependency."""
-    for report, link, pipeline in (
-        ("report", "stages/pipeline.yaml", "dvc.yaml"),
-        (f"{BEYOND}:report", "stages/beyond.yaml", BEYOND),
-    ):
-        assert link in declared()[report][0]
-        assert (ROOT / link).resolve() == ROOT / pipeline
+    for folder, link in ((ROOT, "stages/pipeline.yaml"), (BEYOND, "pipeline.yaml")):
+        assert link in declared(folder)["report"][0]
+        assert (folder / link).resolve() == folder / "dvc.yaml"
 
 
 def covers(dependency: str, file: str) -> bool:
@@ -152,23 +146,37 @@ def covers(dependency: str, file: str) -> bool:
     return file == dependency or file.startswith(f"{dependency}/")
 
 
-@pytest.mark.parametrize("stage", [path.stem for path in STAGES])
-def test_a_stage_depends_on_the_code_that_it_runs(stage):
+SCRIPTS = [
+    *((path, ROOT) for path in STAGES),
+    *((EVIDENCE / f"{name}.py", EVIDENCE) for name in ("train", "imitate")),
+    *(
+        (BEYOND / "stages" / f"{name}.py", BEYOND)
+        for name in ("simulate", "split", "train", "translate", "imitate", "report")
+    ),
+]
+
+
+@pytest.mark.parametrize(("script", "folder"), SCRIPTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_a_stage_depends_on_the_code_that_it_runs(script, folder):
     """No edit goes unnoticed, and no folder is declared that the stage does not use.
 
     Cells may differ where each runs code of its own (a learner, a reward); together they name all of it.
     """
     reached = {
         file
-        for file in reached_from(ROOT / "stages" / f"{stage}.py")
+        for file in reached_from(script)
         if not file.startswith(WITHOUT_EFFECT_ON_RESULTS) and not file.endswith("__init__.py")
     }
-    cells = code_of(stage)
+    own = str(script.relative_to(folder))
+    reached = {own if file == str(script.relative_to(ROOT)) else file for file in reached}
+    cells = code_of(script.stem, folder)
     together = set().union(*cells.values())
+    if folder == BEYOND and script.stem == "imitate":
+        reached -= {"src/anyview/learners/trpo.py"}  # no cell has it
     assert {file for file in reached if not any(covers(dependency, file) for dependency in together)} == set()
     assert {dep for dep in together if not any(covers(dep, file) for file in reached)} == set()
     for name, code in cells.items():
-        assert f"stages/{stage}.py" in code, name
+        assert own in code, name
 
 
 def rerun_by(file: str) -> set[str]:
@@ -187,32 +195,42 @@ def rerun_by(file: str) -> set[str]:
 def test_an_edit_reruns_no_more_than_it_must():
     """Where a rerun takes minutes, dependencies are finer than folders."""
     params = load_params(ROOT / "params.yaml")
-    learners = {name: cell.learner for name, cell in {**params.methods, **params.beyond.cells}.items()}
+    learners = {name: cell.learner for name, cell in params.methods.items()}
     for learner, other in (("ddpg", "trpo"), ("trpo", "ddpg")):
         again = {name.partition("@")[2] for name in rerun_by(f"src/anyview/learners/{learner}.py")} - {""}
         assert {learners[name] for name in again} == {learner}
         assert other not in {learners[name] for name in again}
     for reward in ("gail", "tpil"):
         assert rerun_by(f"src/anyview/adversarial/{reward}.py") == {f"discriminate@{reward}", "report"}
-    embedded = {stage_of(name) for name in rerun_by("src/anyview/training/embedding.py")}
+    embedded = {name.split("@")[0] for name in rerun_by("src/anyview/training/embedding.py")}
     assert embedded == {"embed", "imitate", "report"}
-    assert "embed" not in {stage_of(name) for name in rerun_by("src/anyview/training/translator.py")}
+    assert "embed" not in {name.split("@")[0] for name in rerun_by("src/anyview/training/translator.py")}
     assessed = rerun_by("src/anyview/assessment/similarity.py")
-    assert {stage_of(name) for name in assessed} == {"translate", "report"}
+    assert {name.split("@")[0] for name in assessed} == {"translate", "report"}
     for folder in ("report", "analysis"):
-        assert rerun_by(f"src/anyview/{folder}/__init__.py") == {"report", f"{BEYOND}:report"}
+        assert rerun_by(f"src/anyview/{folder}/__init__.py") == {"report"}
 
 
 def test_every_stage_has_a_script_and_every_script_a_stage():
-    assert {stage_of(name) for name in declared()} == {path.stem for path in STAGES}
+    assert {name.split("@")[0] for name in declared()} == {path.stem for path in STAGES}
+
+
+def test_the_study_knows_nothing_of_the_evidence_and_this_plans_every_seed():
+    assert not any("-seed-" in out for _, outs in declared().values() for out in outs)
+    evidence = load_params(ROOT / "params.yaml").evidence
+    models = {f"{name}-seed-{seed}" for name in evidence.translators for seed in evidence.seeds}
+    outputs = {f"data/models/{model}" for model in models}
+    outputs |= {f"data/policies/{model}-{reward}" for model in models for reward in evidence.rewards}
+    assert set().union(*(outs for _, outs in declared(EVIDENCE).values())) == outputs
 
 
 def test_cells_are_those_of_params():
     params = load_params(ROOT / "params.yaml")
     cells: dict[str, set[str]] = {}
-    for address in declared():
-        stage, _, cell = address.partition("@")
-        cells.setdefault(stage, set()).add(cell)
+    for folder in (ROOT, BEYOND):
+        for address in declared(folder):
+            stage, _, cell = address.partition("@")
+            cells.setdefault(f"beyond {stage}" if folder == BEYOND else stage, set()).add(cell)
     beyond = params.beyond
     for stage, named in (
         ("simulate", beyond.sets),
@@ -221,7 +239,7 @@ def test_cells_are_those_of_params():
         ("translate", beyond.translators),
         ("imitate", beyond.cells),
     ):
-        assert cells[f"{BEYOND}:{stage}"] == set(named)
+        assert cells[f"beyond {stage}"] == set(named)
     assert cells["simulate"] == set(params.simulate.sets)
     assert cells["split"] == set(params.split)
     assert cells["train"] == cells["translate"] == set(params.translators)
@@ -230,26 +248,20 @@ def test_cells_are_those_of_params():
     assert cells["discriminate"] == set(params.adversarial.cells)
 
 
-@pytest.mark.parametrize(("pipeline", "report"), [("", "report"), (f"{BEYOND}:", f"{BEYOND}:report")])
-def test_the_report_reads_every_cell(pipeline, report):
+@pytest.mark.parametrize(
+    ("folder", "unread", "from_the_study"),
+    [
+        (ROOT, {"data/raw/surrogate", "data/clips/rendered", "data/splits/rendered.csv"}, set()),
+        (BEYOND, set(), {"data/policies/ours"}),
+    ],
+    ids=["study", "beyond"],
+)
+def test_the_report_reads_every_cell(folder, unread, from_the_study):
     """Its inputs are written out one by one: none may be forgotten, and none may be left over."""
-    outputs = {
-        out
-        for address, (_, outs) in declared().items()
-        if address != report and address.startswith(pipeline) and (pipeline or BEYOND not in address)
-        for out in outs
-    }
-    data = {dep for dep in declared()[report][0] if dep.startswith("data/")}
-    assert outputs - data <= {"data/raw/surrogate"}
-    assert data - outputs <= ({"data/policies/ours"} if pipeline else set())
-
-
-def test_the_study_of_the_thesis_needs_nothing_beyond_it():
-    """`dvc repro` runs dvc.yaml and what that needs: none of beyond/dvc.yaml."""
-    beyond = {out for address, (_, outs) in declared().items() if address.startswith(BEYOND) for out in outs}
-    assert beyond
-    for address, (deps, _) in declared().items():
-        assert address.startswith(BEYOND) or not deps & beyond, address
+    outputs = {out for address, (_, outs) in declared(folder).items() if address != "report" for out in outs}
+    data = {dep for dep in declared(folder)["report"][0] if dep.startswith("data/")}
+    assert outputs - data == unread
+    assert data - outputs == from_the_study
 
 
 def test_outputs_are_one_folder_or_table_a_cell():

@@ -51,7 +51,8 @@ def reran(study: Study) -> set[str]:
         (
             "imitation.trpo.step",
             0.7,
-            {f"imitate@{name}" for name in ("ours-trpo", "liu")} | {"discriminate@gail", "discriminate@tpil"},
+            {f"imitate@{name}" for name in ("liu", "narrow-trpo")}
+            | {"discriminate@gail", "discriminate@tpil"},
         ),
     ],
 )

@@ -17,7 +17,7 @@ from pydantic import (
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from anyview.paths import REAL
+from anyview.paths import REAL, RENDERED
 from anyview.runtime.errors import AnyviewError
 
 
@@ -99,6 +99,18 @@ class Ingest(Block):
     frames: int = Field(ge=8, le=10_000, description="frames of a clip")
     rate: Positive = Field(description="frames per second after resampling")
     max_megabytes: Positive = Field(description="a larger raw file is refused")
+    even_exposure: bool = Field(
+        description="bring each frame's exposure and white balance to those of its clip's first frame"
+    )
+
+
+class Render(Block):
+    """Stage `render`: scenes of every look, to pretrain on. Their size is that of `real.ingest`."""
+
+    demonstrations: Count = Field(
+        description="demonstrations, each in a scene of its own, seen by two cameras"
+    )
+    moments: Count = Field(description="random moments of each, besides the first frame")
 
 
 class Real(Block):
@@ -109,6 +121,7 @@ class Real(Block):
     )
     film: Film
     ingest: Ingest
+    render: Render
 
 
 class SplitSet(Block):
@@ -141,6 +154,13 @@ class LossWeights(Block):
         return self
 
 
+class Pretraining(Block):
+    """What a translator learns from before it sees its own clips."""
+
+    dataset: str = Field(description="set of clips to pretrain on; the cell's own set where there is none")
+    iterations: CountOrNone = Field(description="how many of the cell's iterations that takes; 0 for none")
+
+
 class TranslatorCell(Block):
     """Stage `train`: one context translator."""
 
@@ -149,11 +169,24 @@ class TranslatorCell(Block):
     optimizer: Literal["adam", "adadelta"]
     iterations: Count
     weights: LossWeights
+    pairs: Literal["any", "views"] = Field(
+        default="any", description="clips to pair: `any` two, or the `views` of one demonstration"
+    )
+    pretraining: Pretraining
     augment: bool = Field(description="augment the contexts during training")
     task_embedding: bool = Field(
         default=False,
         description="give T the mean of Enc1 over 8 frames of the expert's clip; not in the thesis",
     )
+    schedule: Literal["constant", "cosine"] | None = Field(
+        default=None, description="the cell's own instead of `training.schedule`"
+    )
+
+    @model_validator(mode="after")
+    def _some_own_iterations(self) -> "TranslatorCell":
+        if self.pretraining.iterations >= self.iterations:
+            raise ValueError("pretraining.iterations must be below iterations, which count them")
+        return self
 
 
 class EmbeddingCell(Block):
@@ -236,10 +269,11 @@ class Discriminator(Block):
 
 
 class RewardWeights(Block):
-    """Weights of a reward's terms, each in units of what standing still costs; 0 leaves a term out."""
+    """Weights of a reward's terms, in units of what standing still costs unless `raw`; 0 leaves one out."""
 
     feature: NonNegative = Field(description="of L_f, the distance of features")
     image: NonNegative = Field(description="of L_i, the distance of pixels: phi where `feature` is 1")
+    raw: bool = Field(default=False, description="the terms in their own units, as in equation 22")
 
     @model_validator(mode="after")
     def _some_term(self) -> "RewardWeights":
@@ -279,6 +313,7 @@ class Imitation(Block):
     dataset: str = Field(description="simulated set whose held-out clips are imitated")
     demonstrations: Count = Field(description="clips that are imitated, the same for every run and method")
     runs: Count = Field(description="contexts, each with a policy of its own")
+    group: Count = Field(description="runs in lockstep: with 2, 15 runs keep 8 cores busy instead of 2")
     iterations: Count
     episodes_per_iteration: Count = Field(
         description="episodes of 49 steps that each run acts in an iteration"
@@ -323,6 +358,25 @@ class Beyond(Block):
     cells: dict[Name, BeyondCell]
 
 
+class Evidence(Block):
+    """Pipeline `evidence`: the translators of figure 20, each trained several times, as models of `ours`."""
+
+    translators: list[str] = Field(
+        min_length=2, description="cells of `translators`; the first has every loss, the others lack some"
+    )
+    seeds: list[Annotated[int, Field(ge=0)]] = Field(
+        min_length=1, description="of the trainings, one of each translator for each seed"
+    )
+    iterations: Count = Field(description="of each training, instead of the cell's own")
+    rewards: dict[Name, RewardWeights] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _all_different(self) -> "Evidence":
+        if any(len(set(names)) < len(names) for names in (self.translators, self.seeds)):
+            raise ValueError("a translator or a seed is listed twice")
+        return self
+
+
 class Params(Block):
     """The whole of ``params.yaml``."""
 
@@ -338,6 +392,7 @@ class Params(Block):
     imitation: Imitation
     adversarial: Adversarial
     beyond: Beyond
+    evidence: Evidence
 
     @property
     def demonstration_sets(self) -> dict[str, DemonstrationSet]:
@@ -413,7 +468,7 @@ def load_params(path: Path = Path("params.yaml")) -> Params:
 
 def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
     """Names in ``params`` that must be those of other keys: (dotted key, name, the names that fit)."""
-    sets = [*params.simulate.sets, REAL]
+    sets = [*params.simulate.sets, REAL, RENDERED]
     yield from ((f"split.{name}", name, sets) for name in params.split)
     yield from ((f"beyond.split.{name}", name, list(params.beyond.sets)) for name in params.beyond.split)
     for key, beyond in params.beyond.translators.items():
@@ -423,19 +478,23 @@ def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
         yield f"beyond.cells.{key}.model", method.model, list(params.translator_cells)
     for block, models in (("translators", params.translators), ("embeddings", params.embeddings)):
         yield from ((f"{block}.{key}.dataset", cell.dataset, sets) for key, cell in models.items())
+    for key, translator in params.translators.items():
+        yield f"translators.{key}.pretraining.dataset", translator.pretraining.dataset, sets
     yield "imitation.dataset", params.imitation.dataset, list(params.simulate.sets)
     for key, cell in params.imitation.cells.items():
         fitting = params.embeddings if cell.reward == "embedding" else params.translators
         yield f"imitation.cells.{key}.model", cell.model, fitting
+    yield from (("evidence.translators", name, params.translators) for name in params.evidence.translators)
 
 
 def _refuse_twins(params: Params, name: str) -> None:
     """Refuse two cells that would write to one folder, and a set of clips that is never split."""
+    made = [*params.simulate.sets, REAL, RENDERED]
     for block, key, other, taken in (
         ("embeddings", params.embeddings, "translators", params.translators),
         ("adversarial.cells", params.adversarial.cells, "imitation.cells", params.imitation.cells),
         ("simulate.sets", params.simulate.sets, "the clips that stage ingest makes", [REAL]),
-        ("beyond.sets", params.beyond.sets, "simulate.sets or ingest", [*params.simulate.sets, REAL]),
+        ("beyond.sets", params.beyond.sets, "simulate.sets, ingest or render", made),
         (
             "beyond.translators",
             params.beyond.translators,
@@ -443,12 +502,13 @@ def _refuse_twins(params: Params, name: str) -> None:
             [*params.translators, *params.embeddings],
         ),
         ("beyond.cells", params.beyond.cells, "imitation.cells or adversarial.cells", params.methods),
+        ("simulate.sets", params.simulate.sets, "the clips that stage render makes", [RENDERED]),
     ):
         for cell in key:
             if cell in taken:
                 raise AnyviewError(f"{name}: {block}.{cell}: the name is taken by {other}")
     for block, sets, split in (
-        ("split", [*params.simulate.sets, REAL], params.split),
+        ("split", made, params.split),
         ("beyond.split", params.beyond.sets, params.beyond.split),
     ):
         for dataset in sets:

@@ -7,7 +7,8 @@ METRICS = Path("metrics")
 REPORT = DATA / "report"
 BEYOND = DATA / "beyond"  # the report on what goes beyond the thesis
 
-REAL = "real"  # the set of clips that ingest makes; the others are simulated
+REAL = "real"  # the set of clips that ingest makes
+RENDERED = "rendered"  # the set that stage render makes; the others are simulated
 
 
 def raw(source: str) -> Path:
@@ -38,3 +39,8 @@ def translations(cell: str) -> Path:
 def policies(cell: str) -> Path:
     """Policies of a method and how they end."""
     return DATA / "policies" / cell
+
+
+def replicate(translator: str, seed: int, reward: str = "") -> str:
+    """Name of one of several trainings of a translator, and of its policies under a ``reward``."""
+    return f"{translator}-seed-{seed}" + (f"-{reward}" if reward else "")

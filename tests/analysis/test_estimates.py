@@ -1,15 +1,16 @@
 """Intervals against independent calculations."""
 
 import math
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import stats
 
 from anyview.analysis.estimates import Estimator, proportion, tidy, without_interval
-from anyview.analysis.statistics import mcnemar_exact, wilson_interval
+from anyview.analysis.statistics import EXACT_PAIRS, holm, mcnemar_exact, sign_flip_test, wilson_interval
 
 NORMAL_97_5 = 1.959963984540054
 
@@ -45,6 +46,56 @@ def test_twelve_against_seven_of_fifteen_is_not_significant():
     ours = np.arange(15) < 12
     other = np.arange(15) < 7
     assert mcnemar_exact(ours, other) == pytest.approx(2 * 0.5**5)
+
+
+@settings(deadline=None)
+@given(st.lists(st.integers(-20, 20), min_size=1, max_size=10))
+def test_sign_flips_are_counted_one_by_one(whole):
+    """With ties, which whole numbers have many of. In sevenths, so that no sum is exact."""
+    sums = [
+        abs(sum(sign * value for sign, value in zip(signs, whole, strict=True))) for signs in flips(whole)
+    ]
+    expected = np.mean([each >= abs(sum(whole)) for each in sums])
+    assert sign_flip_test(np.array(whole) / 7) == pytest.approx(expected)
+
+
+def flips(values) -> list[tuple[int, ...]]:
+    return list(product((1, -1), repeat=len(values)))
+
+
+def test_sign_flips_agree_with_scipy_at_fifteen_pairs():
+    rng = np.random.default_rng(0)
+    for shift in (0.0, 0.3, 1.0):
+        values = rng.normal(shift, 1, 15)
+        theirs = stats.permutation_test((values,), np.mean, permutation_type="samples", n_resamples=2**15)
+        assert sign_flip_test(values) == pytest.approx(theirs.pvalue)
+
+
+def test_of_fifteen_runs_that_agree_one_pattern_in_16384_is_as_far_out():
+    assert sign_flip_test(np.arange(1, 16)) == pytest.approx(2 / 2**15)
+
+
+@pytest.mark.parametrize("shift", [0.1, 0.3])
+def test_many_pairs_take_the_normal_limit_which_the_count_is_close_to(shift):
+    values = np.random.default_rng(1).normal(shift, 1, EXACT_PAIRS)
+    counted = sign_flip_test(values)
+    limit = 2 * stats.norm.sf(abs(values.sum()) / np.sqrt((values**2).sum()))
+    assert counted == pytest.approx(limit, abs=0.01)
+    doubled = np.concatenate([values, values])
+    expected = 2 * stats.norm.sf(abs(doubled.sum()) / np.sqrt((doubled**2).sum()))
+    assert sign_flip_test(doubled) == pytest.approx(expected)
+
+
+@settings(deadline=None)
+@given(st.lists(st.floats(0, 1), min_size=1, max_size=7))
+def test_holm_is_the_closed_test_of_bonferroni(p_values):
+    """A contrast counts if in every set of contrasts that it is in, the least p times their number does."""
+    corrected = holm(np.array(p_values))
+    indices = range(len(p_values))
+    for one in indices:
+        sets = [chosen for size in indices for chosen in combinations(indices, size + 1) if one in chosen]
+        worst = max(min(p_values[each] for each in chosen) * len(chosen) for chosen in sets)
+        assert corrected[one] == pytest.approx(min(1.0, worst))
 
 
 def test_bootstrap_of_a_mean_agrees_with_the_normal_theory():

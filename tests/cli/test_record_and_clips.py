@@ -225,18 +225,18 @@ def test_clips_lists_sets_splits_and_refusals_and_writes_a_sheet(tmp_path, root)
             {"clip": f"c{index}", "file": f"c{index}.avi", "pair": f"p{index}", "camera": "", "kind": kind}
         )
     write_set(folder, pd.DataFrame(rows), files)
-    (folder / "refused.csv").write_text('file,reason\nbad.mp4,"damaged: cut short"\n')
+    (folder / "refused.csv").write_text('file,pair,reason\nbad.mp4,bad,"damaged: cut short"\n')
     (tmp_path / "data" / "splits").mkdir()
     (tmp_path / "data" / "splits" / "real.csv").write_text("clip,pair,split\nc0,p0,train\nc2,p2,extreme\n")
     code, out, err = run("clips", "--sheet", "sheet.png", cwd=tmp_path)
     assert (code, err) == (0, "")
-    assert "bad.mp4: damaged: cut short" in out
+    assert "bad.mp4: damaged: cut short (pair bad)" in out
     sheet = cv2.imread(str(tmp_path / "sheet.png"))
     assert np.abs(sheet[:48, :48, ::-1].astype(int) - pictures(10, 48, 48, seed=0)[0]).mean() < 8
     code, out, _ = run("clips", "--json", cwd=tmp_path)
     found = json.loads(out)
     assert found["sets"]["real"] == {"train": 1, "validation": 0, "extreme": 1, "unused": 1}
     assert found["kinds"]["standard"] == {"train": 1, "validation": 0, "extreme": 0, "unused": 1}
-    assert found["refused"] == [{"file": "bad.mp4", "reason": "damaged: cut short"}]
+    assert found["refused"] == [{"file": "bad.mp4", "pair": "bad", "reason": "damaged: cut short"}]
     code, _, err = run("clips", "--sheet", "sheet.gif", cwd=tmp_path)
     assert (code, err) == (2, "error: sheet.gif: a contact sheet is a .png file\n")

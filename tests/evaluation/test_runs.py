@@ -69,8 +69,9 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 def test_groups_are_fixed() -> None:
-    assert groups_of(15) == [range(8), range(8, 15)]
-    assert groups_of(2) == [range(2)]
+    assert groups_of(15, 8) == [range(8), range(8, 15)]
+    assert groups_of(2, 8) == [range(2)]
+    assert [len(group) for group in groups_of(15, 2)] == [2] * 7 + [1]
 
 
 def test_the_stage_leaves_what_the_contract_says(study: Path, root: Path) -> None:

@@ -11,7 +11,7 @@ from anyview.config import Ingest
 from anyview.ingest.clips import Candidate, ingest_clip
 from anyview.seeds import stream
 
-LIMITS = Ingest(size=48, frames=80, rate=10.0, max_megabytes=50.0)
+LIMITS = Ingest(size=48, frames=80, rate=10.0, max_megabytes=50.0, even_exposure=False)
 
 
 @cache

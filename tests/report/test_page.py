@@ -133,7 +133,7 @@ def test_a_part_of_the_study_gives_a_page(data, report):
     done = report(data.root)
     assert done.returncode == 0, done.stderr
     page = Reader((data.root / "data/report/index.html").read_text(encoding="utf-8"))
-    assert "Not run in this study: TRPO, diverse" in page.text
+    assert "Not run in this study: Liu (TRPO, diverse)" in page.text
     assert {"figure-18", "figure-19", "final-distance-against-ours"} <= set(page.ids)
     assert not {"figure-13", "figure-17", "figure-20", "what-the-thesis-leaves-open"} & set(page.ids)
     assert "Surrogate clips." not in page.text

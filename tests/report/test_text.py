@@ -20,16 +20,16 @@ def paragraph(text: str, start: str) -> str:
     return found
 
 
-def test_orders_are_claimed_by_the_paired_intervals(data, params):
+def test_orders_are_claimed_by_the_corrected_test(data, params):
     data.policies("ours", 0.03)
     data.policies("oracle", 0.01)
     data.policies("gail", 0.5, returns=False)
     data.policies("no-alignment", 0.03)
     text = text_of(data, params)
     assert paragraph(text, "Farther from the goal than ours").startswith(
-        "Farther from the goal than ours: GAIL by 4"
+        "Farther from the goal than ours: GAIL, 2"
     )
-    assert "Oracle (true view) by" in paragraph(text, "Nearer to the goal than ours")
+    assert "Oracle (true view), 0." in paragraph(text, "Nearer to the goal than ours")
     assert paragraph(text, "No order") == "No order can be claimed between ours and: without L_align."
 
 
@@ -44,13 +44,14 @@ def test_a_method_of_few_runs_is_open(data, params):
 
 
 def test_effects_of_the_two_by_two_are_put_into_words(data, params):
-    for cell, distance in (("liu", 0.3), ("narrow-ddpg", 0.3), ("ours-trpo", 0.03), ("ours", 0.03)):
+    for cell, distance in (("narrow-trpo", 0.3), ("narrow-ddpg", 0.3), ("liu", 0.03), ("ours", 0.03)):
         data.policies(cell, distance)
     text = text_of(data, params)
-    contexts = paragraph(text, "Diverse contexts instead of narrow ones: −2")
+    contexts = paragraph(text, "Diverse contexts instead of narrow ones: 0.")
+    assert "times as far, p < 0.001, −2" in contexts
     assert contexts.endswith("; the object ends nearer to the goal.")
-    learner = paragraph(text, "DDPG instead of TRPO")
-    assert learner.endswith("; the interval holds zero, so no effect is claimed.")
+    learner = paragraph(text, "DDPG instead of Liu's TRPO")
+    assert learner.endswith("; chance explains it, so no effect is claimed.")
 
 
 @pytest.mark.parametrize(

@@ -32,12 +32,23 @@ def literal(
 
 
 @pytest.mark.parametrize(
-    ("feature", "image", "power"),
-    [(True, True, 0.0), (True, True, 2.0), (True, False, 0.0), (False, True, 1.0)],
+    ("feature", "image", "power", "raw"),
+    [
+        (True, True, 0.0, False),
+        (True, True, 2.0, False),
+        (True, False, 0.0, False),
+        (False, True, 1.0, False),
+        (True, True, 0.0, True),
+        (True, True, 2.0, True),
+        (True, False, 0.0, True),
+        (False, True, 1.0, True),
+    ],
 )
-def test_reward_is_the_equations(translator, expert_clips, feature: bool, image: bool, power: float) -> None:
+def test_reward_is_the_equations(
+    translator, expert_clips, feature: bool, image: bool, power: float, raw: bool
+) -> None:
     demonstrations, first = expert_clips[:3], expert_clips[3:, 0]
-    weights = RewardWeights(feature=1.0 if feature else 0.0, image=0.3 if image else 0.0)
+    weights = RewardWeights(feature=1.0 if feature else 0.0, image=0.3 if image else 0.0, raw=raw)
     targets = translate_demonstrations(translator, demonstrations, first)
     reward = DemonstrationReward(translator, *targets, first, weights, power)
     # Standing still, term by term: the units.
@@ -55,20 +66,22 @@ def test_reward_is_the_equations(translator, expert_clips, feature: bool, image:
             for copy in range(2):
                 l_f, l_i = literal(translator, demonstrations, first[run], frames[run, copy], t)
                 phi = 0.3 if image else 0.0
-                terms = (l_f / still[run, 0] if feature else 0.0) + phi * l_i / still[run, 1]
-                expected = (t / 49) ** power * terms / ((1.0 if feature else 0.0) + phi)
-                np.testing.assert_allclose(got[run, copy], expected, rtol=1e-4)
+                costs = np.ones(2) if raw else still[run]
+                terms = (l_f / costs[0] if feature else 0.0) + phi * l_i / costs[1]
+                whole = (still[run] / costs * [float(feature), phi]).sum()  # what standing still costs
+                np.testing.assert_allclose(got[run, copy], (t / 49) ** power * terms / whole, rtol=1e-4)
                 # In the equations' own units: L_f + phi' L_i, or L_i alone.
-                ratio = phi * still[run, 0] / still[run, 1]
+                ratio = phi * costs[0] / costs[1]
                 plain = l_f + ratio * l_i if feature else l_i
                 np.testing.assert_allclose(
                     got[run, copy] * reward.scales[run], (t / 49) ** power * plain, rtol=1e-4
                 )
 
 
-def test_standing_still_earns_minus_one_a_step(translator, expert_clips) -> None:
+@pytest.mark.parametrize("raw", [False, True])
+def test_standing_still_earns_minus_one_a_step(translator, expert_clips, raw: bool) -> None:
     first = expert_clips[:, 0]
-    weights = RewardWeights(feature=1.0, image=0.7)
+    weights = RewardWeights(feature=1.0, image=0.7, raw=raw)
     for targets in (
         translate_demonstrations(translator, expert_clips[:3], first),
         true_demonstrations(translator, expert_clips),

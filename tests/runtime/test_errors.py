@@ -118,3 +118,17 @@ for _ in run_tasks(hold, [(arguments[0], n) for n in range(4)]): pass"""
     os.killpg(process.pid, signal.SIGINT)
     _, said = process.communicate(timeout=180)
     assert (process.returncode, said) == (130, "interrupted: run the same command again to continue\n")
+
+
+def test_a_stopped_stage_waits_for_nobody():
+    """Not for a thread, which may be a pool's that hangs."""
+    body = """import threading
+threading.Thread(target=time.sleep, args=(600,)).start()
+print('ready', flush=True)
+time.sleep(600)"""
+    process = stage(body)
+    assert process.stdout is not None
+    process.stdout.readline()
+    process.terminate()
+    _, said = process.communicate(timeout=180)
+    assert (process.returncode, said) == (130, "interrupted: run the same command again to continue\n")

@@ -18,7 +18,7 @@ from anyview.surrogate.webcam import Lens, Webcam, frame_times
 from anyview.video.files import read_video
 from anyview.video.manifests import times_file
 
-LIMITS = Ingest(size=48, frames=80, rate=10.0, max_megabytes=50.0)
+LIMITS = Ingest(size=48, frames=80, rate=10.0, max_megabytes=50.0, even_exposure=False)
 
 
 def test_the_plan_makes_the_clips_of_the_study():

@@ -1,17 +1,21 @@
 """Which frames are paired with which."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from anyview.runtime.errors import AnyviewError
 from anyview.training.common.batches import (
     FramePairs,
     training_pairs,
     training_triplets,
+    training_views,
     validation_pairs,
     validation_triplets,
 )
 from anyview.video.datasets import Dataset
+from tests.training.discworld import clip_table, disc_clips
 
 
 def test_training_pairs_are_two_training_clips_at_one_time(discs):
@@ -49,6 +53,23 @@ def test_the_frames_to_embed_are_those_of_the_clips_i(discs):
     assert frames.shape == (2, 3, 16, 16, 3)
     assert np.array_equal(frames[0, 1], discs.frames[3, 4])
     assert np.array_equal(frames[1, 2], discs.frames[1, 11])
+
+
+def test_views_are_of_one_demonstration_to_train_on():
+    pairs = ["a", "b", "a", "c", "b", "d", "d"]
+    splits = ["train"] * 5 + ["validation"] * 2
+    dataset = Dataset("rendered", disc_clips(7), clip_table(splits, pairs))
+    drawn = training_views(dataset, np.random.default_rng(0), 2000)
+    views = {(0, 2), (2, 0), (1, 4), (4, 1)}
+    assert set(zip(drawn.sources.tolist(), drawn.targets.tolist(), strict=True)) == views
+    assert set(drawn.times) == set(range(dataset.length))
+
+
+def test_demonstrations_without_a_second_view_are_refused(discs):
+    with pytest.raises(
+        AnyviewError, match="data set diverse: no demonstration to train on has a second view"
+    ):
+        training_views(discs, np.random.default_rng(0), 5)
 
 
 @given(length=st.integers(1, 60), count=st.integers(1, 9))

@@ -13,13 +13,16 @@ import pandas as pd
 import pytest
 import torch
 
+from anyview.config import Pretraining
 from anyview.runtime.errors import AnyviewError
 from anyview.training.common.batches import FramePairs, validation_pairs
 from anyview.training.common.fit import LIVE_CURVES, fit, update, validate
 from anyview.training.common.optimization import SharedOptimizer
 from anyview.training.translator import TranslatorObjective
 from anyview.translator.weights import load_translator, read_meta
+from anyview.video.datasets import Dataset
 from anyview.video.pixels import to_input
+from tests.training.discworld import clip_table, disc_clips
 
 UNEVEN = (slice(0, 1), slice(1, 3))  # parts of 4 and of 8 pairs
 FILES = ("weights.safetensors", "model.json", "curve.csv")
@@ -107,6 +110,32 @@ def test_killed_training_continues_to_the_same_bytes(pipeline, make_objective):
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     for name in FILES:
         assert (Path("killed") / name).read_bytes() == (Path("alone") / name).read_bytes(), name
+
+
+def test_pretraining_learns_from_the_other_set_first(make_objective, discs):
+    """Until then as if on that set alone; after it, from the cell's own, by the same random streams."""
+    other = Dataset("rendered", disc_clips(40, seed=9), clip_table(["train"] * 30 + ["validation"] * 10))
+    made = make_objective()
+    pretraining = Pretraining(dataset="rendered", iterations=3)
+    cell = made.cell.model_copy(update={"pretraining": pretraining})
+    both = TranslatorObjective(cell, made.training, 1, discs, other)
+    alone = TranslatorObjective(made.cell, made.training, 1, other)
+    model = made.network()
+    for iteration in range(6):
+        expected = alone if iteration < 3 else made
+        pairs = both.batch(iteration)
+        losses = both.losses(model, pairs, iteration, 0)
+        assert torch.equal(losses, expected.losses(model, expected.batch(iteration), iteration, 0))
+    (part, *_), (same, *_) = both.validation(), made.validation()
+    assert torch.equal(both.validation_losses(model, part), made.validation_losses(model, same))
+
+
+def test_pretraining_on_frames_of_another_size_is_refused(make_objective, discs):
+    made = make_objective()
+    other = Dataset("rendered", disc_clips(4, size=32), clip_table(["train"] * 2 + ["validation"] * 2))
+    cell = made.cell.model_copy(update={"pretraining": Pretraining(dataset="rendered", iterations=3)})
+    with pytest.raises(AnyviewError, match="rendered and diverse: frames of 32 and 16 pixels"):
+        TranslatorObjective(cell, made.training, 1, discs, other)
 
 
 class Exploding(TranslatorObjective):

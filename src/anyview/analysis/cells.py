@@ -8,9 +8,9 @@ ADAM, ADADELTA, AUGMENTED, SIM = "real-adam", "real-adadelta", "real-augmented",
 LABELS = {
     "ours": "Ours (DDPG, diverse)",
     "oracle": "Oracle (true view)",
-    "ours-trpo": "TRPO, diverse",
+    "liu": "Liu (TRPO, diverse)",
     "narrow-ddpg": "DDPG, narrow",
-    "liu": "Liu (TRPO, narrow)",
+    "narrow-trpo": "TRPO, narrow",
     "tcn": "TCN embedding",
     "tpil": "TPIL",
     "gail": "GAIL",
@@ -31,13 +31,18 @@ LABELS = {
 ABLATIONS = tuple(cell for cell in LABELS if cell.startswith("no-"))
 """Figure 20: a loss of the translator, or a term of the reward, left out."""
 
-FACTORIAL = (("liu", "narrow-ddpg"), ("ours-trpo", "ours"))
-"""The 2x2 that the thesis leaves open: rows narrow and diverse contexts, columns TRPO and DDPG."""
+FACTORIAL = (("narrow-trpo", "narrow-ddpg"), ("liu", OURS))
+"""The 2x2 of data and learning: rows narrow and diverse contexts, columns Liu's learning and ours."""
 
 
 def label(cell: str) -> str:
     """What a reader sees; a cell that a user added keeps its own name."""
     return LABELS.get(cell, cell)
+
+
+def ablation(translator: str) -> str:
+    """The method that has this translator of figure 20: `no-alignment` for `sim-no-alignment`."""
+    return OURS if translator == SIM else translator.removeprefix(f"{SIM}-")
 
 
 def in_order(cells: Iterable[str]) -> list[str]:

@@ -1,27 +1,40 @@
-"""Methods compared on shared contexts: paired differences, McNemar, the 2x2 of learner and data."""
+"""Methods compared on shared contexts: paired differences, exact tests, the 2x2 of learning and data."""
 
 from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
 
-from anyview.analysis.cells import FACTORIAL, OURS, in_order
-from anyview.analysis.estimates import Estimate, Estimator
-from anyview.analysis.statistics import mcnemar_exact
+from anyview.analysis.cells import ABLATIONS, FACTORIAL, OURS, in_order
+from anyview.analysis.estimates import Estimator
+from anyview.analysis.statistics import holm, mcnemar_exact, sign_flip_test
 from anyview.analysis.study import EvaluatedMethod
 
 ENOUGH_RUNS = 6
-"""Fewer paired runs carry no claim: not even a sign test of runs that all agree would reach 5%."""
+"""Fewer paired runs carry no claim: not even a sign-flip test of runs that all agree would reach 5%."""
+SIGNIFICANT = 0.05
+FLOOR = 0.001
+"""Metres: two objects nearer to the goal than this are equally near."""
 
 Methods = Mapping[str, EvaluatedMethod]
+
+
+def log_distance(metres: np.ndarray | pd.Series) -> np.ndarray:
+    """The scale on which distances are compared: log(max(distance, FLOOR)), same shape.
+
+    A run that misses by half a metre and one that misses by a centimetre then weigh by their ratio.
+    """
+    return np.log(np.maximum(np.asarray(metres, float), FLOOR))
 
 
 def differences(methods: Methods, estimator: Estimator) -> pd.DataFrame:
     """Every method against `ours`, over the runs that both have; no rows where `ours` was not run.
 
-    ``value, low, high``: mean paired difference of final distance in metres (above 0: farther than ours).
-    ``only_ours, only_other``: runs in which one alone succeeds; ``p`` of McNemar's test. ``order``: see
-    ``claimed``.
+    ``figure``: 19, or 20 for an ablation. ``value, low, high``: mean paired difference of final distance in
+    metres (above 0: farther than ours). ``ratio, ratio_low, ratio_high``: geometric mean of how many times as
+    far. ``p``: sign-flip test of the log distances. ``only_ours, only_other``: runs in which one alone
+    succeeds; ``p_success`` of McNemar's test. Both tests are exact, and corrected for all contrasts of the
+    figure. ``order``: see ``claimed``.
     """
     rows = []
     for cell in in_order(methods) if OURS in methods else ():
@@ -30,45 +43,54 @@ def differences(methods: Methods, estimator: Estimator) -> pd.DataFrame:
         pairs = methods[OURS].runs.merge(
             methods[cell].runs, on="run", suffixes=("", "_other"), validate="one_to_one"
         )
-        distance = (pairs["final_distance_other"] - pairs["final_distance"]).to_numpy(float)
-        found = estimator.mean(f"{cell}/difference", distance)
         ours, other = pairs["success"].to_numpy(bool), pairs["success_other"].to_numpy(bool)
-        sides = (np.sum(ours & ~other), np.sum(other & ~ours), mcnemar_exact(ours, other))
-        rows.append(
-            (cell, len(pairs), found.value, found.low, found.high, *sides, claimed(found, len(pairs)))
+        contrast = _contrast(
+            f"{cell}/difference",
+            (pairs["final_distance_other"] - pairs["final_distance"]).to_numpy(float),
+            log_distance(pairs["final_distance_other"]) - log_distance(pairs["final_distance"]),
+            estimator,
         )
-    names = ["cell", "runs", "value", "low", "high", "only_ours", "only_other", "p", "order"]
-    return pd.DataFrame(rows, columns=names)
+        rows.append(
+            {
+                "cell": cell,
+                "figure": 20 if cell in ABLATIONS else 19,
+                **contrast,
+                "only_ours": np.sum(ours & ~other),
+                "only_other": np.sum(other & ~ours),
+                "p_success": mcnemar_exact(ours, other),
+            }
+        )
+    table = pd.DataFrame(rows, columns=["cell", "figure", *_CONTRAST, "only_ours", "only_other", "p_success"])
+    for test in ("p", "p_success"):
+        table[test] = table.groupby("figure")[test].transform(holm)
+    return table.assign(order=claimed(table))
 
 
 def effects(methods: Methods, estimator: Estimator) -> pd.DataFrame:
-    """Contrasts of the 2x2 in metres of final distance; no rows unless all four cells were run.
+    """Contrasts of the 2x2 of final distance; no rows unless all four cells were run.
 
-    ``name, runs, value, low, high, order``: diverse contexts, DDPG, and their interaction. A main effect
-    averages over the other factor. All are means of per-run contrasts, so that what a context does to all
-    four methods cancels.
+    Columns as in ``differences``, by ``name``: diverse contexts, our learning, and their interaction. A main
+    effect averages over the other factor. All are means of per-run contrasts, so that what a context does to
+    all four methods cancels. ``p`` is corrected for the three.
     """
     rows = []
     if _all_four(methods):
         series = {
             cell: methods[cell].runs.set_index("run")["final_distance"] for row in FACTORIAL for cell in row
         }
-        distances = pd.DataFrame(series).dropna()
-        (narrow_trpo, narrow_ddpg), (diverse_trpo, diverse_ddpg) = (
-            [distances[cell] for cell in row] for row in FACTORIAL
-        )
-        contexts = (diverse_trpo + diverse_ddpg - narrow_trpo - narrow_ddpg) / 2
-        learner = (narrow_ddpg + diverse_ddpg - narrow_trpo - diverse_trpo) / 2
-        interaction = (diverse_ddpg - diverse_trpo) - (narrow_ddpg - narrow_trpo)
-        for name, contrast in (
-            ("Diverse contexts instead of narrow ones", contexts),
-            ("DDPG instead of TRPO", learner),
-            ("Both together, beyond the sum of each", interaction),
+        metres = pd.DataFrame(series).dropna().to_numpy(float)  # runs, (narrow, diverse) x (Liu's, ours)
+        for name, weights in (
+            ("Diverse contexts instead of narrow ones", [-0.5, -0.5, 0.5, 0.5]),
+            ("DDPG instead of Liu's TRPO", [-0.5, 0.5, -0.5, 0.5]),
+            ("Both together, beyond what each does alone", [1, -1, -1, 1]),
         ):
-            found = estimator.mean(f"factorial/{name}", contrast.to_numpy())
-            order = claimed(found, len(contrast))
-            rows.append((name, len(contrast), found.value, found.low, found.high, order))
-    return pd.DataFrame(rows, columns=["name", "runs", "value", "low", "high", "order"])
+            contrast = _contrast(
+                f"factorial/{name}", metres @ weights, log_distance(metres) @ weights, estimator
+            )
+            rows.append({"name": name, **contrast})
+    table = pd.DataFrame(rows, columns=["name", *_CONTRAST])
+    table["p"] = holm(table["p"].to_numpy(float))
+    return table.assign(order=claimed(table))
 
 
 def factorial(methods: Methods, estimator: Estimator) -> pd.DataFrame:
@@ -83,16 +105,31 @@ def factorial(methods: Methods, estimator: Estimator) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["contexts", "learner", "value", "low", "high"])
 
 
-def claimed(difference: Estimate, runs: int) -> str:
-    """The order that may be claimed of a paired difference: ``nearer``, ``farther``, ``open`` or ``few``.
+def claimed(contrasts: pd.DataFrame) -> list[str]:
+    """The order that may be claimed of each contrast: ``nearer``, ``farther``, ``open`` or ``few``.
 
-    ``few``: fewer than ``ENOUGH_RUNS``. ``open``: the interval holds zero.
+    ``few``: fewer than ``ENOUGH_RUNS``. ``open``: the corrected test does not exclude chance.
     """
-    if runs < ENOUGH_RUNS:
-        return "few"
-    if not difference.excludes_zero:
-        return "open"
-    return "farther" if difference.value > 0 else "nearer"
+    return [
+        "few"
+        if row.runs < ENOUGH_RUNS
+        else "open"
+        if row.p >= SIGNIFICANT
+        else "farther"
+        if row.ratio > 1
+        else "nearer"
+        for row in contrasts.itertuples()
+    ]
+
+
+_CONTRAST = ("runs", "value", "low", "high", "ratio", "ratio_low", "ratio_high", "p")
+
+
+def _contrast(name: str, metres: np.ndarray, logs: np.ndarray, estimator: Estimator) -> dict[str, float]:
+    """A contrast (n,) of runs, in metres and on the log scale, with the test that is not corrected yet."""
+    mean, ratio = estimator.mean(name, metres), estimator.mean(f"{name}/log", logs).exponential()
+    values = (len(metres), mean.value, mean.low, mean.high, ratio.value, ratio.low, ratio.high)
+    return dict(zip(_CONTRAST, (*values, sign_flip_test(logs)), strict=True))
 
 
 def _all_four(methods: Methods) -> bool:

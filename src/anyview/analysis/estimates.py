@@ -8,7 +8,13 @@ import numpy as np
 import pandas as pd
 
 from anyview.analysis import thesis
-from anyview.analysis.statistics import bootstrap_interval, quantile_interval, resampled, wilson_interval
+from anyview.analysis.statistics import (
+    RESAMPLES,
+    bootstrap_interval,
+    quantile_interval,
+    resampled,
+    wilson_interval,
+)
 from anyview.seeds import stream
 
 
@@ -20,10 +26,9 @@ class Estimate:
     low: float
     high: float
 
-    @property
-    def excludes_zero(self) -> bool:
-        """Whether the whole interval lies on one side of 0."""
-        return self.low > 0 or self.high < 0
+    def exponential(self) -> "Estimate":
+        """e to the power of value and bounds: a difference of logarithms as a ratio."""
+        return Estimate(math.exp(self.value), math.exp(self.low), math.exp(self.high))
 
 
 @dataclass(frozen=True)
@@ -36,6 +41,19 @@ class Estimator:
         """Mean of ``values`` (n,); those of one group (``groups``: (n,)) are drawn together."""
         sums = _sums(values, groups)
         return Estimate(float(np.mean(values)), *bootstrap_interval(sums, _ratio_of_sums, self._stream(name)))
+
+    def crossed_mean(self, name: str, values: np.ndarray) -> Estimate:
+        """Mean of ``values`` (K, n) of K translators in the same n contexts.
+
+        Translators are drawn, and then the contexts for all of these at once (Owen 2007): what a context does
+        to every translator, and what a translator does in every context, are drawn once.
+        """
+        rng = self._stream(name)
+        translators, contexts = (
+            rng.multinomial(count, np.full(count, 1 / count), RESAMPLES) / count for count in values.shape
+        )
+        draws = np.einsum("bk,kn,bn->b", translators, values, contexts, optimize=True)
+        return Estimate(float(values.mean()), *quantile_interval(draws))
 
     def median(self, name: str, values: np.ndarray) -> Estimate:
         """Median of ``values`` (n,)."""

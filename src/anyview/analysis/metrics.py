@@ -58,8 +58,8 @@ def details(table: pd.DataFrame) -> Tree:
 def summary(results: Results) -> Tree:
     """What a reviewer reads first, in so few digits that another run of the same study hardly changes them.
 
-    ``success_percent`` and ``distance_cm`` (median, final) by method; ``held_out_loss`` and ``psnr_db`` by
-    translator, over the validation clips; ``placed_percent`` and ``placed_percent_extreme``, frames with the
+    ``success_percent`` and ``distance_cm`` (median, final) by method; ``held_out_loss`` by translator,
+    over the validation clips; ``placed_percent`` and ``placed_percent_extreme``, frames with the
     object in its place, by translator of real clips; ``data`` counts demonstrations, and real clips by
     split.
     """
@@ -69,7 +69,6 @@ def summary(results: Results) -> Tree:
         "success_percent": _column(methods, "success_rate", lambda rate: round(100 * rate)),
         "distance_cm": _column(methods, "final_distance_median", lambda metres: round(100 * metres, 1)),
         "held_out_loss": _column(translators, "validation.loss", lambda loss: int(_significant(loss, 2))),
-        "psnr_db": _column(translators, "validation.psnr", lambda decibels: round(decibels, 1)),
         "placed_percent": _column(real, "validation.placed", lambda share: round(100 * share)),
         "placed_percent_extreme": _column(real, "extreme.placed", lambda share: round(100 * share)),
         "data": _counts(results.data),

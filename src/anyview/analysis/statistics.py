@@ -1,4 +1,4 @@
-"""Uncertainty of an evaluation: Wilson intervals, bootstrap intervals, exact McNemar tests. All at 95%."""
+"""Uncertainty of an evaluation: 95% intervals (Wilson, bootstrap), exact paired tests, Holm's correction."""
 
 from collections.abc import Callable
 
@@ -8,6 +8,11 @@ from scipy import stats
 Interval = tuple[float, float]
 
 RESAMPLES = 10_000
+_EXACT_WAYS = (
+    50_000  # two samples of 9 can be dealt out in 48,620 ways; where there are more, so many are drawn
+)
+EXACT_PAIRS = 40
+"""Up to so many pairs the sign-flip test counts every pattern of signs; beyond, it takes the normal limit."""
 
 
 def wilson_interval(successes: int, trials: int) -> Interval:
@@ -46,3 +51,51 @@ def mcnemar_exact(first: np.ndarray, second: np.ndarray) -> float:
     if only_first + only_second == 0:
         return 1.0
     return float(stats.binomtest(only_first, only_first + only_second).pvalue)
+
+
+def sign_flip_test(differences: np.ndarray) -> float:
+    """p-value of the two-sided sign-flip test (Fisher, 1935) of paired ``differences`` (n,).
+
+    If a pair's two values might as well be exchanged, each of the 2^n patterns of signs is as likely as the
+    one seen: p is the fraction of them whose sum is at least as far from 0. Exact up to ``EXACT_PAIRS``.
+    """
+    differences = np.asarray(differences, float)
+    if len(differences) > EXACT_PAIRS:
+        return float(2 * stats.norm.sf(abs(differences.sum()) / np.sqrt(np.sum(differences**2))))
+    seen = abs(differences.sum()) - 1e-9 * np.abs(differences).sum()  # what equals it counts, in any order
+    if seen <= 0:
+        return 1.0
+    first, second = (_signed_sums(half) for half in np.array_split(differences, 2))
+    reached = len(second) - np.searchsorted(np.sort(second), seen - first)
+    return float(2 * reached.sum() / 2 ** len(differences))
+
+
+def exchange_test(first: np.ndarray, second: np.ndarray) -> float:
+    """p-value of the two-sided exact permutation test of the means of two samples, (n,) and (m,).
+
+    If it makes no difference from which sample a value is, every way of dealing them out is as likely.
+    """
+    found = stats.permutation_test(
+        (first, second), _difference_of_means, n_resamples=_EXACT_WAYS, rng=np.random.default_rng(0)
+    )
+    return float(found.pvalue)
+
+
+def _difference_of_means(first: np.ndarray, second: np.ndarray, axis: int) -> np.ndarray:
+    return np.mean(first, axis=axis) - np.mean(second, axis=axis)
+
+
+def _signed_sums(values: np.ndarray) -> np.ndarray:
+    """The sums of ``values`` (n,) under every pattern of signs, (2^n,)."""
+    sums = np.zeros(1)
+    for value in values:
+        sums = np.concatenate([sums + value, sums - value])
+    return sums
+
+
+def holm(p_values: np.ndarray) -> np.ndarray:
+    """p-values (m,) corrected for being m (Holm, 1979): the chance that any is below 5% by luck is 5%."""
+    p_values = np.asarray(p_values, float)
+    order = np.argsort(p_values)
+    corrected = np.maximum.accumulate(p_values[order] * np.arange(len(order), 0, -1)).clip(max=1)
+    return corrected[np.argsort(order)]

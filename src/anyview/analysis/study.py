@@ -175,7 +175,7 @@ def read_study(params: Params, root: Path = Path()) -> Study:
         {name: read_split(path) for name, path in splits.items()},
         {cell: _model(folder) for cell, folder in models.items()},
         {cell: _translator(folder) for cell, folder in translations.items()},
-        {cell: _method(folder) for cell, folder in policies.items()},
+        {cell: read_method(folder) for cell, folder in policies.items()},
         tuple(path for group in groups for path in group.values()),
     )
 
@@ -202,7 +202,8 @@ def _translator(folder: Path) -> AssessedTranslator:
     return AssessedTranslator(folder, clips, weights["weight"].to_numpy())
 
 
-def _method(folder: Path) -> EvaluatedMethod:
+def read_method(folder: Path) -> EvaluatedMethod:
+    """Read one method's folder; AnyviewError names a broken file."""
     runs = _numbers(folder / "runs.csv", ["run", "success", "final_distance"], text="choice")
     curve = _numbers(folder / "curve.csv", ["iteration", "run", "final_distance", "return"])
     demonstrations = read_table(folder / "demonstrations.csv", ["clip"])["clip"]

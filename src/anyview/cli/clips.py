@@ -23,7 +23,17 @@ def clips(
             "--propose", help="Propose a manifest for the raw clips, with start and end by their motion."
         ),
     ] = False,
-    raw: Annotated[Path, typer.Option("--raw", metavar="FOLDER", help="The raw clips to propose for.")] = RAW,
+    from_lerobot: Annotated[
+        Path | None,
+        typer.Option(
+            "--from-lerobot", metavar="FOLDER", help="List the episodes of a LeRobotDataset in the manifest."
+        ),
+    ] = None,
+    camera: Annotated[
+        list[str] | None,
+        typer.Option(metavar="KEY", help="Its camera, observation.images.top; repeat for two views."),
+    ] = None,
+    raw: Annotated[Path, typer.Option("--raw", metavar="FOLDER", help="The folder of raw clips.")] = RAW,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON for a script.")] = False,
 ) -> None:
     """List the clips that there are, by kind, split and source, and the refused with the reason."""
@@ -34,6 +44,9 @@ def clips(
         raise AnyviewError(f"{sheet}: a contact sheet is a .png file")
     if propose:
         _propose(raw, as_json)
+        return
+    if from_lerobot is not None:
+        _list_episodes(raw, from_lerobot, camera or [], as_json)
         return
     params = load_params()
     found = survey(ingested_source() or params.real.source, params.split)
@@ -56,6 +69,18 @@ def _propose(folder: Path, as_json: bool) -> None:
         print(f"{row['file']}: {row['reason'] or '{start} to {end} s'.format(**row)}")
     print(f"check {folder / 'manifest.proposed.csv'} by the pictures in {folder / 'manifest.proposed.png'};")
     print("then rename it to manifest.csv")
+
+
+def _list_episodes(folder: Path, dataset: Path, cameras: list[str], as_json: bool) -> None:
+    from anyview.cli.episodes import list_episodes
+
+    rows = list_episodes(folder, dataset, cameras)
+    if as_json:
+        print(
+            json.dumps({"manifest": str(folder / "manifest.csv"), "clips": rows.to_dict("records")}, indent=2)
+        )
+        return
+    print(f"{len(rows)} clips of {rows['pair'].nunique()} episodes: added to {folder / 'manifest.csv'}")
 
 
 def _write_sheet(path: Path) -> None:

@@ -55,6 +55,8 @@ def disk_needed(params: Params) -> tuple[float, float]:
     clips = 2 * film.pairs + film.singles + 2 * film.extreme_pairs
     raw = clips * _RAW_FRAMES * film.width * film.width * 9 / 16
     small = clips * params.real.ingest.frames * params.real.ingest.size**2
+    render = params.real.render
+    pixels += 2 * render.demonstrations * (1 + render.moments) * params.real.ingest.size**2
     return 2 * (pixels * _STORED_PIXEL + raw * _RAW_PIXEL) + _OTHER, (pixels + small) * 3 + _OTHER
 
 

@@ -12,7 +12,9 @@ import typer
 from rich.console import Console
 
 from anyview.cli.clips import clips
+from anyview.cli.export import export
 from anyview.cli.record import record
+from anyview.cli.repro import repro
 from anyview.cli.review import review, sweep
 from anyview.cli.translate import translate
 from anyview.cli.watch import watch
@@ -41,7 +43,8 @@ def _anyview(
 ) -> None:
     """Imitation of a task from a video filmed from any viewpoint.
 
-    Run from the root of the repository. `dvc repro` runs the pipeline; these commands help around it.
+    Run from the root of the repository. `anyview repro`, or `dvc repro`, runs the pipeline; the other
+    commands help around it.
 
     Exit codes: 0 done, 1 the answer is no, 2 bad input, 130 interrupted.
     """
@@ -126,7 +129,19 @@ def clean(as_json: Annotated[bool, typer.Option("--json", help="Print JSON for a
         print(f"{folder}: {freed / 1e6:.0f} MB freed")
 
 
-for command in (doctor, profile, record, clips, translate, watch, review, sweep, clean):
+for command in (
+    repro,
+    doctor,
+    profile,
+    record,
+    clips,
+    export,
+    translate,
+    watch,
+    review,
+    sweep,
+    clean,
+):
     app.command()(command)
 
 
@@ -139,7 +154,8 @@ def _run() -> None:
     try:
         app(prog_name="anyview")
     except ModuleNotFoundError as error:
-        raise AnyviewError(f"{error}; run `make setup`") from None
+        advice = "pip install 'anyview[lerobot]'" if error.name == "pyarrow" else "run `make setup`"
+        raise AnyviewError(f"{error}; {advice}") from None
     except SystemExit as ended:
         if ended.code:
             raise

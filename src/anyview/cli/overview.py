@@ -28,7 +28,7 @@ def survey(source: str, names: Iterable[str]) -> dict[str, Any]:
     real = paths.clip_set(paths.REAL)
     clips = _split_of(_table(real / "manifest.csv", ["clip", "kind"]), paths.REAL)
     kinds = {kind: _count(clips["split"][clips["kind"] == kind]) for kind in KINDS}
-    refused = _table(real / "refused.csv", ["file", "reason"]).to_dict("records")
+    refused = _table(real / "refused.csv", ["file", "pair", "reason"]).to_dict("records")
     return {"source": source, "raw": raw, "sets": sets, "kinds": kinds, "refused": refused}
 
 
@@ -53,7 +53,7 @@ def lines(found: dict[str, Any]) -> Iterator[str]:
     yield f"raw clips: {raw}; the real ones above are {found['source']}"
     yield f"refused: {len(found['refused'])}"
     for row in found["refused"][:_SHOWN]:
-        yield f"  {row['file']}: {row['reason']}"
+        yield f"  {row['file']}: {row['reason']} (pair {row['pair']})"
     if len(found["refused"]) > _SHOWN:
         yield f"  and more: see {paths.clip_set(paths.REAL) / 'refused.csv'}"
 

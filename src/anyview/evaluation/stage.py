@@ -40,7 +40,7 @@ def evaluate_method(name: str, params: Params, method: Method, sources: Sequence
     ``choice`` then, and ``demonstrations.csv`` has ``choice``.
     """
     imitated = _imitated(name, params)
-    numbers = groups_of(params.imitation.runs)
+    numbers = groups_of(params.imitation.runs, params.imitation.group)
     values, files = _origin(name, params, sources)
     tasks: list[tuple[Any, ...]] = []
     acted: list[Context] = []

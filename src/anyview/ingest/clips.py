@@ -171,20 +171,20 @@ def resolve_pairs(candidates: Sequence[Candidate], verdicts: Sequence[Verdict]) 
 def publish(
     output: Path, folder: Path, candidates: Sequence[Candidate], verdicts: Sequence[Verdict]
 ) -> tuple[int, int]:
-    """Copy the finished clips from ``folder`` and write their tables and ``refused.csv`` (``file, reason``).
+    """Copy the finished clips from ``folder`` and write their tables; refused.csv has file, pair and reason.
 
     Returns how many were accepted and refused.
     """
     files, rows, refused = [], [], []
     for candidate, verdict in zip(candidates, verdicts, strict=True):
         if verdict.stored is None:
-            refused.append((candidate.file, verdict.reason))
+            refused.append((candidate.file, candidate.pair, verdict.reason))
             continue
         files.append(StoredFile(**verdict.stored))
         rows.append({key: getattr(candidate, key) for key in _COLUMNS} | {"file": files[-1].file})
         shutil.copyfile(folder / files[-1].file, output / files[-1].file)
     write_set(output, pd.DataFrame(rows, columns=list(_COLUMNS)), files)
     write_atomically(
-        output / "refused.csv", pd.DataFrame(refused, columns=["file", "reason"]).to_csv(index=False)
+        output / "refused.csv", pd.DataFrame(refused, columns=["file", "pair", "reason"]).to_csv(index=False)
     )
     return len(files), len(refused)

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from anyview.config import Ingest
+from anyview.ingest.exposure import even_exposure
 from anyview.runtime.errors import AnyviewError
 from anyview.video.manifests import read_table, times_file
 from anyview.video.reading import MAX_RATE, Frame, Video, open_video
@@ -17,6 +18,7 @@ LONGEST = 1.5  # a raw clip without a stretch may be this many times as long as 
 SHORTEST_STRETCH, LONGEST_STRETCH = 1.0, 300.0  # seconds
 LARGEST_SIDECAR = 2**20  # bytes, tens of thousands of times
 PATIENCE = 120.0  # seconds of decoding, a hundred times what a clip takes
+CLOCKS_AGREE = 0.001  # seconds; the end of a stretch is rounded, and so are the times of frames
 LONGEST_GAP = 2.5  # output periods without a source frame
 MAX_REPEATS = 0.1  # of a clip's frames may show their predecessor again: the camera was a little slow
 MAX_STILL = 0.5  # of a clip's frames may be their predecessor's copy: somebody pauses
@@ -69,7 +71,7 @@ def read_clip(path: Path, limits: Ingest, stretch: Stretch | None = None) -> np.
         raise Refused("damaged: a frame cannot be decoded") from None
     seconds = stretch.end - stretch.start if stretch else limits.frames / limits.rate
     _check_content(frames[fresh], fresh.sum() / seconds)
-    return frames
+    return even_exposure(frames) if limits.even_exposure else frames
 
 
 def sidecar_times(path: Path) -> np.ndarray | None:
@@ -105,6 +107,8 @@ def _resample(
             previous, last = max(last, start), time
             if time - previous > LONGEST_GAP / limits.rate:
                 raise Refused(f"no frame between {previous:.2f} s and {time:.2f} s")
+            if stretch and time > end - CLOCKS_AGREE:  # it may show the beginning of another demonstration
+                break
             while 0 < filled < limits.frames and time > moments[filled] + tolerance:
                 frames[filled] = frames[filled - 1]
                 filled += 1

@@ -22,6 +22,14 @@ class Bounded(Protocol):
     high: float
 
 
+class Ratio(Protocol):
+    """A contrast on the log scale, as ``comparisons`` has it."""
+
+    ratio: float
+    ratio_low: float
+    ratio_high: float
+
+
 def number(value: float) -> str:
     """Four significant digits: 11,560; 0.0123; 15."""
     if abs(value) >= 1000:
@@ -80,10 +88,9 @@ def centimetres_spread(found: Bounded) -> str:
     return _unbroken(f"{centimetres(found.value)} [{100 * found.low:.1f}, {100 * found.high:.1f}]")
 
 
-def centimetres_apart(found: Bounded) -> str:
-    """The size of a difference, whatever its sign: 4.1 cm [1.2, 7.0]."""
-    low, high = sorted((100 * abs(found.low), 100 * abs(found.high)))
-    return _unbroken(f"{centimetres(abs(found.value))} [{low:.1f}, {high:.1f}]")
+def times(found: Ratio) -> str:
+    """How many times as far, with its 95% bounds: 2.4 [1.3, 4.2]."""
+    return _unbroken(f"{found.ratio:.2g} [{found.ratio_low:.2g}, {found.ratio_high:.2g}]")
 
 
 def probability(p: float) -> str:

@@ -27,10 +27,11 @@ def write_plots(folder: Path, study: Study, results: Results) -> None:
     success = rates.assign(method=rates["cell"].map(label)).rename(columns={"value": "success_rate"})
     _write(folder / "success.csv", success[["method", "success_rate", "low", "high", "thesis"]])
     table = results.differences
-    differences = table.assign(method=table["cell"].map(label)).rename(
-        columns={"value": "difference", "p": "mcnemar_p"}
+    differences = table.assign(method=table["cell"].map(label)).rename(columns={"value": "difference"})
+    _write(
+        folder / "differences.csv",
+        differences[["method", "difference", "low", "high", "ratio", "p", "p_success"]],
     )
-    _write(folder / "differences.csv", differences[["method", "difference", "low", "high", "mcnemar_p"]])
     for cell, translator in study.translators.items():
         picture = strip(typical_strip(translator), f"{cell}: {translator.typical('validation')}")
         write_atomically(folder / "strips" / f"{cell}.png", to_png(picture))

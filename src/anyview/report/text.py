@@ -31,7 +31,7 @@ _FILTERS: tuple[Callable[..., str], ...] = (
     formatting.rate_spread,
     formatting.centimetres,
     formatting.centimetres_spread,
-    formatting.centimetres_apart,
+    formatting.times,
     formatting.probability,
     formatting.listed,
     formatting.plural,

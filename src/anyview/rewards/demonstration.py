@@ -26,8 +26,11 @@ class DemonstrationReward:
     standing still. So standing still earns -1 a step in every context and with every translator, one learning
     rate serves them all, and the weights have no unit. A term of weight 0 is not computed.
 
+    With ``raw`` weights it is -(t/T)^p (w_f L_f + w_i L_i)/(w_f u_f + w_i u_i): equation 22 with phi =
+    w_i/w_f, up to a constant of the run, so that standing still earns -1 a step here too.
+
     ``scales`` (R,) bring a reward back to the equations' scale, where L_f has weight 1: reward * scales =
-    L_f + phi (u_f/u_i) L_i with phi = w_i/w_f, or L_i where w_f is 0.
+    L_f + phi L_i, or L_i where w_f is 0. Here phi = w_i/w_f, times u_f/u_i unless the weights are ``raw``.
     """
 
     def __init__(
@@ -49,13 +52,17 @@ class DemonstrationReward:
         with torch.inference_mode():
             still_features = ((model.encode_expert(first)[:, None] - features) ** 2).sum(-1)
             still_images = ((first[:, None] - images) ** 2).sum((2, 3, 4))
-        feature_cost = (self._weights * still_features).mean(1).clamp_min(1e-6)
-        image_cost = (self._weights * still_images).mean(1).clamp_min(1e-6)
-        norm = weights.feature + weights.image
-        self._feature_scale = weights.feature / norm / feature_cost[:, None]
-        self._image_scale = weights.image / norm / image_cost[:, None]
-        leading = feature_cost / weights.feature if weights.feature else image_cost / weights.image
-        self.scales = (leading * norm).cpu().numpy()
+        feature_cost = (self._weights * still_features).mean(1, keepdim=True).clamp_min(1e-6)  # (R, 1)
+        image_cost = (self._weights * still_images).mean(1, keepdim=True).clamp_min(1e-6)
+        feature: float | Tensor = weights.feature
+        image: float | Tensor = weights.image
+        if weights.raw:
+            feature, image = feature * feature_cost, image * image_cost
+        norm = feature + image
+        self._feature_scale = feature / norm / feature_cost
+        self._image_scale = image / norm / image_cost
+        leading = feature_cost / feature if weights.feature else image_cost / image
+        self.scales = (leading * norm)[:, 0].cpu().numpy()
 
     @torch.inference_mode()
     def step(self, frames: np.ndarray, step: int) -> np.ndarray:

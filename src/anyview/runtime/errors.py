@@ -5,6 +5,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from types import FrameType
 from typing import NoReturn
 
@@ -36,8 +37,20 @@ def run_stage(main: Callable[[list[str]], None]) -> NoReturn:
     The process ends when its parent does, so that a killed ``dvc repro`` leaves no orphan behind.
     """
     end_with_parent()
+    raise_when_terminated()
+    code = exit_code(lambda: main(sys.argv[1:]), "interrupted: run the same command again to continue")
+    if code == INTERRUPTED:
+        # Workers end with this process. Python would wait for theirs and for every thread, at worst for ever.
+        with suppress(OSError):
+            sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    sys.exit(code)
+
+
+def raise_when_terminated() -> None:
+    """Let SIGTERM raise ``Terminated`` in the main thread from now on."""
     signal.signal(signal.SIGTERM, _raise_terminated)
-    sys.exit(exit_code(lambda: main(sys.argv[1:]), "interrupted: run the same command again to continue"))
 
 
 def exit_code(action: Callable[[], object], interrupted: str = "interrupted") -> int:

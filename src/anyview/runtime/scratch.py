@@ -20,7 +20,7 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 KINDS = ("checkpoints", "frames")
-_AFTERWARDS = ("analysis", "report", "review", "cli")  # folders whose code only looks at what is finished
+_AFTERWARDS = ("analysis", "report", "review", "cli", "parallel")  # folders whose code makes no result
 
 _NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)  # what a file system without locks answers
 

@@ -24,7 +24,7 @@ from anyview.runtime.parent import end_with_parent
 
 T = TypeVar("T")
 
-_RETRIES = 3
+RETRIES = 3  # of a Ray task whose node dies
 _PATIENCE = 10  # seconds for a cluster's address to answer
 
 
@@ -72,8 +72,8 @@ def _begin_worker(stage: int) -> None:
 
 
 def _run_on_ray(function: Callable[..., T], tasks: Sequence[tuple[Any, ...]]) -> Iterator[T]:
-    ray = _connect()
-    remote = ray.remote(num_cpus=1, max_retries=_RETRIES)(_ray_task)
+    ray = connect_to_ray()
+    remote = ray.remote(num_cpus=1, max_retries=RETRIES)(_ray_task)
     shared = {name: value for name, value in os.environ.items() if name.startswith("ANYVIEW_")}
     function = ray.put(function)
     pending = deque(remote.remote(function, task, os.getcwd(), shared) for task in tasks)
@@ -84,7 +84,7 @@ def _run_on_ray(function: Callable[..., T], tasks: Sequence[tuple[Any, ...]]) ->
     except ray.exceptions.RayTaskError as error:
         raise error.cause from None
     except ray.exceptions.RayError as error:
-        raise AnyviewError(f"Ray gave up on a task after {_RETRIES} tries: {error}") from None
+        raise AnyviewError(f"Ray gave up on a task after {RETRIES} tries: {error}") from None
     finally:
         for reference in pending:
             ray.cancel(reference, force=True)
@@ -101,7 +101,7 @@ def _ray_task(
     return function(*(np.array(value) if isinstance(value, np.ndarray) else value for value in task))
 
 
-def _connect() -> Any:
+def connect_to_ray() -> Any:
     """Ray, connected to the cluster at ``RAY_ADDRESS`` or else to one of this machine's own."""
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     try:

@@ -18,7 +18,7 @@ from anyview.video.manifests import times_file
 
 RATE = 10.0  # that the camera claims in its files; the true times lie in the sidecar
 _DURATION = 8.15
-_RENDER_SCALE = 0.6  # a cheap webcam's picture is softer than its pixels: rendered smaller, then enlarged
+RENDER_SCALE = 0.6  # a cheap webcam's picture is softer than its pixels: rendered smaller, then enlarged
 # The two webcams, the same on every day of filming.
 _LENSES = {"left": (0.75, -0.13, 0.020), "right": (0.80, -0.17, 0.030)}  # fovy in radians, k1, k2
 _KINDS = ("standard", "distractor", "standard", "extreme_view", "standard", "distractor", "standard")
@@ -64,7 +64,7 @@ def _film(folder: Path, demonstration: Demonstration, width: int, seed: int) -> 
     rng = stream(seed, "film", demonstration.index)
     kind = demonstration.kind
     size = (width, width * 9 // 16)
-    rendered = (round(size[0] * _RENDER_SCALE), round(size[1] * _RENDER_SCALE))
+    rendered = (round(size[0] * RENDER_SCALE), round(size[1] * RENDER_SCALE))
     push = sample_push(rng)
     lenses = [Lens(size, *_LENSES[camera]) for camera in demonstration.cameras]
     arm = float(push.cup[-1, 3]) + np.pi  # where the arm comes from, seen from the target

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anyview.runtime.graphics import load_mujoco
+from anyview.surrogate.arm import bend, lean
 from anyview.surrogate.mjcf import geom, numbers, rgba
 from anyview.surrogate.push import CUP_DEPTH, CUP_HALF_WIDTH, OBJECT_RADIUS, TARGET_HALF, Push
 from anyview.surrogate.textures import TABLES, materials_xml, texture_files
@@ -25,6 +26,7 @@ _ROD_TILT = 0.80  # radians that the tool's rod leans back from upright
 _GRIP = 0.25  # metres along the rod from the cup to the hand
 _UPPER_ARM, _FOREARM = 0.33, 0.31
 _SHOULDER = np.array([0.17, -0.62, 0.34])
+_OUTWARDS = np.array([0.8, -0.2, -0.5])  # where the elbow hangs
 
 
 @dataclass(frozen=True)
@@ -92,8 +94,8 @@ class Scene:
         self._place("tool", (x, y, height), heading)
         rod = np.array([*-math.sin(_ROD_TILT) * unit_vector(heading), math.cos(_ROD_TILT)])
         wrist = np.array([x, y, height + 0.02]) + (_GRIP + 0.05) * rod
-        shoulder = _lean(_SHOULDER, wrist)
-        elbow = _elbow(shoulder, wrist)
+        shoulder = lean(_SHOULDER, wrist, _UPPER_ARM + _FOREARM)
+        elbow = bend(shoulder, wrist, _UPPER_ARM, _FOREARM, _OUTWARDS)
         self._place("torso", (shoulder - _SHOULDER) * (1.0, 1.0, 0.0), 0.0)
         self._span("forearm", wrist, elbow)
         self._span("upper_arm", elbow, shoulder)
@@ -108,24 +110,6 @@ class Scene:
         self._data.mocap_pos[mocap] = begin
         direction = (end - begin) / math.dist(begin, end)
         mujoco.mju_quatZ2Vec(self._data.mocap_quat[mocap], direction)
-
-
-def _lean(shoulder: np.ndarray, wrist: np.ndarray) -> np.ndarray:
-    """The operator leans over the table when the wrist is out of reach."""
-    distance = math.dist(shoulder, wrist)
-    excess = max(distance - 0.97 * (_UPPER_ARM + _FOREARM), 0.0)
-    return shoulder + excess * (wrist - shoulder) / distance
-
-
-def _elbow(shoulder: np.ndarray, wrist: np.ndarray) -> np.ndarray:
-    """Two-link inverse kinematics, the elbow hanging down and outwards."""
-    gap = wrist - shoulder
-    reach = math.dist(shoulder, wrist)
-    along = (reach**2 + _UPPER_ARM**2 - _FOREARM**2) / (2 * reach)
-    aside = np.array([0.8, -0.2, -0.5])
-    aside -= (aside * gap).sum() * gap / reach**2
-    offset = math.sqrt(max(_UPPER_ARM**2 - along**2, 0.0))
-    return shoulder + along * gap / reach + offset * aside / math.hypot(*aside)
 
 
 def _tool_xml(skin: str) -> str:

@@ -26,6 +26,7 @@ class EmbeddingObjective:
 
     def __init__(self, cell: EmbeddingCell, training: Training, seed: int, dataset: Dataset):
         self.cell, self.training, self.seed, self.dataset = cell, training, seed, dataset
+        self.dataset_names = [dataset.name]
 
     def network(self) -> Embedding:
         """The first weights."""

@@ -9,9 +9,10 @@ from torch import Tensor
 
 from anyview.config import Training, TranslatorCell
 from anyview.runtime.device import products_in
+from anyview.runtime.errors import AnyviewError
 from anyview.seeds import stream, torch_seed
 from anyview.training.augmentation import Augmentation
-from anyview.training.common.batches import FramePairs, training_pairs, validation_pairs
+from anyview.training.common.batches import FramePairs, training_pairs, training_views, validation_pairs
 from anyview.training.common.optimization import MakeOptimizer
 from anyview.translator.losses import NAMES, Losses, batch_losses
 from anyview.translator.network import ContextTranslator, task_frames
@@ -21,19 +22,43 @@ from anyview.video.pixels import to_input
 
 _OPTIMIZERS: dict[str, MakeOptimizer] = {
     "adam": lambda parameters: torch.optim.Adam(parameters, fused=True),
-    "adadelta": lambda parameters: torch.optim.Adadelta(parameters, foreach=True),
+    # The averages and the constant of TensorFlow, the thesis's framework; PyTorch's own are 0.9 and 1e-6.
+    "adadelta": lambda parameters: torch.optim.Adadelta(parameters, rho=0.95, eps=1e-8, foreach=True),
 }
 
 
 class TranslatorObjective:
-    """See ``fit.Objective``. Losses: L, L_tr, L_rec and L_align, NaN where the cell leaves one out."""
+    """See ``fit.Objective``. Losses: L, L_tr, L_rec and L_align, NaN where the cell leaves one out.
+
+    The first ``cell.pretraining.iterations`` learn from the data set ``pretraining``, the others from
+    ``dataset``, which also validates from the start. Raises AnyviewError if their frames differ in size.
+    """
 
     names = ("loss", *NAMES)
 
-    def __init__(self, cell: TranslatorCell, training: Training, seed: int, dataset: Dataset):
-        self.cell, self.training, self.seed, self.dataset = cell, training, seed, dataset
+    def __init__(
+        self,
+        cell: TranslatorCell,
+        training: Training,
+        seed: int,
+        dataset: Dataset,
+        pretraining: Dataset | None = None,
+    ):
+        self.cell, self.seed, self.dataset = cell, seed, dataset
+        self._pretraining = pretraining or dataset
+        if self._pretraining.image_size != dataset.image_size:
+            sizes = f"{self._pretraining.image_size} and {dataset.image_size} pixels"
+            raise AnyviewError(f"data sets {self._pretraining.name} and {dataset.name}: frames of {sizes}")
+        self.training = training.model_copy(update={"schedule": cell.schedule or training.schedule})
         self.optimizer = _OPTIMIZERS[cell.optimizer]
-        self._augmentation = Augmentation(dataset) if cell.augment else None
+        self._augmentations = (
+            {learnt.name: Augmentation(learnt) for learnt in self._learnt()} if cell.augment else {}
+        )
+
+    @property
+    def dataset_names(self) -> list[str]:
+        """Of the sets of clips that the training reads."""
+        return [dataset.name for dataset in self._learnt()]
 
     def network(self) -> ContextTranslator:
         """With the same first weights for every cell of an architecture: ablations differ in losses alone."""
@@ -47,19 +72,21 @@ class TranslatorObjective:
     def batch(self, iteration: int) -> FramePairs:
         """``batch_size`` pairs of one frame each."""
         rng = stream(self.seed, "translator/pairs", iteration)
-        return training_pairs(self.dataset, rng, self.training.batch_size)
+        draw = {"any": training_pairs, "views": training_views}[self.cell.pairs]
+        return draw(self._learnt_at(iteration), rng, self.training.batch_size)
 
     def losses(self, model: ContextTranslator, pairs: FramePairs, iteration: int, part: int) -> Tensor:
         """(4,), with dropout and augmentation."""
         device = next(model.parameters()).device
-        paired, context, clip = self._frames(pairs, device)
-        if self._augmentation is not None:
+        dataset = self._learnt_at(iteration)
+        paired, context, clip = self._frames(dataset, pairs, device)
+        if augmentation := self._augmentations.get(dataset.name):
             rng = stream(self.seed, "translator/augmentation", iteration, part)
             expert, target = paired.chunk(2)
             shown = expert[None] if clip is None else torch.cat((expert[None], clip.transpose(0, 1)))
-            expert, *others = self._augmentation(shown, pairs.sources, rng)
+            expert, *others = augmentation(shown, pairs.sources, rng)
             clip = torch.stack(others, dim=1) if others else None
-            context, target = self._augmentation(torch.stack((context, target)), pairs.targets, rng)
+            context, target = augmentation(torch.stack((context, target)), pairs.targets, rng)
             paired = torch.cat((expert, target))
         seed = torch_seed(self.seed, "translator/dropout", iteration, part)
         noise = torch.Generator(device).manual_seed(seed)
@@ -77,7 +104,7 @@ class TranslatorObjective:
         """L_tr, L_rec and L_align, (3,)."""
         device = next(model.parameters()).device
         with products_in(self.training.precision, device):
-            losses = batch_losses(model, *self._frames(pairs, device))
+            losses = batch_losses(model, *self._frames(self.dataset, pairs, device))
         return torch.stack(losses.parts())
 
     def validation_row(self, means: Tensor) -> dict[str, float]:
@@ -89,7 +116,15 @@ class TranslatorObjective:
         """Write a model folder."""
         save_translator(folder, model, meta)
 
-    def _frames(self, pairs: FramePairs, device: torch.device) -> tuple[Tensor, Tensor, Tensor | None]:
+    def _learnt(self) -> list[Dataset]:
+        return [self._pretraining, self.dataset] if self.cell.pretraining.iterations else [self.dataset]
+
+    def _learnt_at(self, iteration: int) -> Dataset:
+        return self._pretraining if iteration < self.cell.pretraining.iterations else self.dataset
+
+    def _frames(
+        self, dataset: Dataset, pairs: FramePairs, device: torch.device
+    ) -> tuple[Tensor, Tensor, Tensor | None]:
         """o_t^i, o_t^j (2N, 3, H, W); o_0^j (N, 3, H, W); frames of the clips i to embed (N, K, 3, H, W)."""
 
         def load(frames: np.ndarray) -> Tensor:
@@ -97,5 +132,5 @@ class TranslatorObjective:
 
         clip = None
         if self.cell.task_embedding:
-            clip = load(pairs.clips(self.dataset, task_frames(self.dataset.length)))
-        return load(pairs.frames(self.dataset)), load(pairs.contexts(self.dataset)), clip
+            clip = load(pairs.clips(dataset, task_frames(dataset.length)))
+        return load(pairs.frames(dataset)), load(pairs.contexts(dataset)), clip

@@ -89,7 +89,8 @@ class Encoder(nn.Module):
             x = _activate(convolution(x))
             maps.append(x)
         flat = x.movedim(1, -1).flatten(1)  # (row, column, channel): no copy in channels_last
-        return self.output(_drop(_activate(self.hidden(flat)), self._dropout, noise)), maps
+        hidden = _activate(self.hidden(_drop(flat, self._dropout, noise)))
+        return self.output(_drop(hidden, self._dropout, noise)), maps
 
 
 class Translation(nn.Module):
@@ -102,7 +103,8 @@ class Translation(nn.Module):
         self._dropout = architecture.dropout
 
     def forward(self, features: list[Tensor], noise: Generator | None = None) -> Tensor:
-        hidden = _activate(self.hidden(torch.cat(features, dim=1)))
+        joined = torch.cat(features, dim=1)
+        hidden = _activate(self.hidden(_drop(joined, self._dropout, noise)))
         return self.output(_drop(hidden, self._dropout, noise))
 
 
@@ -163,7 +165,8 @@ class Decoder(nn.Module):
         return [layer.skip_terms(skip) for layer, skip in zip(layers, reversed(skips), strict=True)]
 
     def forward(self, z: Tensor, skip_terms: list[SkipTerms], noise: Generator | None = None) -> Tensor:
-        hidden = _drop(_activate(self.hidden(z)), self._dropout, noise)
+        hidden = _activate(self.hidden(_drop(z, self._dropout, noise)))
+        hidden = _drop(hidden, self._dropout, noise)
         x = hidden.unflatten(1, (self._side, self._side, -1)).movedim(-1, 1)
         *layers, last = zip(self.convolutions, skip_terms, strict=True)
         for convolution, terms in layers:

@@ -47,6 +47,13 @@ class Dataset:
         names = self.clips["split"].to_numpy()
         return {name: np.flatnonzero(names == name) for name in np.unique(names)}
 
+    @cached_property
+    def views(self) -> list[np.ndarray]:
+        """Indices of the clips of each demonstration to train on that several cameras saw."""
+        clips = self.clips.reset_index(drop=True).iloc[self.split("train")]
+        groups = clips.groupby("pair", sort=False).indices.values()
+        return [self.split("train")[group] for group in groups if len(group) > 1]
+
 
 def open_dataset(name: str) -> Dataset:
     """One of the pipeline's data sets; clips that no split names are left with an empty split.

@@ -1,7 +1,7 @@
 """Whole video files of our own: frames are uint8 RGB arrays (T, H, W, 3).
 
-FFV1 in AVI is lossless and keeps simulated frames; XVID, 4 times smaller, keeps real clips. Both give the
-same bytes for any number of cores.
+FFV1 in AVI is lossless and keeps simulated frames; XVID, 4 times smaller, keeps real clips; AV1 in MP4 is
+what other programs show. All give the same bytes for any number of cores.
 """
 
 import os
@@ -18,12 +18,14 @@ from av.video.frame import VideoFrame
 from anyview.runtime.errors import AnyviewError
 from anyview.video.reading import open_video
 
-Codec = Literal["FFV1", "XVID"]
+Codec = Literal["FFV1", "XVID", "AV1"]
+os.environ.setdefault("SVT_LOG", "1")  # errors: the encoder of AV1 tells its whole configuration
 
-# XVID: of constant quality, a key frame every 12 frames.
-_ENCODERS: dict[Codec, tuple[Literal["ffv1", "mpeg4"], str, dict[str, str]]] = {
+# XVID: of constant quality, a key frame every 12 frames. AV1: a key frame every 2 frames, as LeRobot has it.
+_ENCODERS: dict[Codec, tuple[Literal["ffv1", "mpeg4", "libsvtav1"], str, dict[str, str]]] = {
     "FFV1": ("ffv1", "bgr0", {"flags": "+bitexact"}),
     "XVID": ("mpeg4", "yuv420p", {"flags": "+bitexact+qscale", "qmin": "3", "g": "12"}),
+    "AV1": ("libsvtav1", "yuv420p", {"crf": "20", "preset": "8", "g": "2", "svtav1-params": "lp=1"}),
 }
 
 

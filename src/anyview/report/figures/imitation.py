@@ -54,16 +54,18 @@ def success(rates: pd.DataFrame) -> Figure:
 
 
 def differences(table: pd.DataFrame) -> Figure:
-    """Paired differences of final distance against `ours`; coloured where an order may be claimed."""
+    """How many times as far as `ours` each method ends; coloured where an order may be claimed."""
     styles = {"farther": (VERMILLION, ">"), "nearer": (GREEN, "<")}
     with canvas(0.34 * len(table) + 1.0) as (figure, (axis,)):
-        axis.axvline(0, color=QUIET, linewidth=1)
+        axis.axvline(1, color=QUIET, linewidth=1)
         for place, row in enumerate(table.itertuples()):
             color, marker = styles.get(row.order, (QUIET, "o"))
-            axis.plot([100 * row.low, 100 * row.high], [place, place], color=color, linewidth=2.2)
-            axis.plot(100 * row.value, place, marker=marker, color=color, markersize=7)
+            axis.plot([row.ratio_low, row.ratio_high], [place, place], color=color, linewidth=2.2)
+            axis.plot(row.ratio, place, marker=marker, color=color, markersize=7)
         name_rows(axis, table["cell"])
-        axis.set(xlabel="cm farther than ours (mean, 95%)", title="Nearer  ←  ours  →  farther")
+        axis.set_xscale("log")
+        axis.xaxis.set_major_formatter("{x:g}")
+        axis.set(xlabel="times as far as ours (geometric mean, 95%)", title="Nearer  ←  ours  →  farther")
         return figure
 
 

@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from anyview.runtime.errors import AnyviewError
 from anyview.video.datasets import Dataset, clip_pairs
 
 
@@ -54,6 +55,19 @@ def training_pairs(dataset: Dataset, rng: np.random.Generator, count: int) -> Fr
     targets = start[sources] + (sources - start[sources] + further) % size[sources]
     times = rng.integers(dataset.length, size=count)
     return FramePairs(clips[sources], clips[targets], times)
+
+
+def training_views(dataset: Dataset, rng: np.random.Generator, count: int) -> FramePairs:
+    """``count`` pairs: two views of one demonstration of the training split, at the same random time.
+
+    Raises AnyviewError if every demonstration was seen by one camera alone.
+    """
+    views = dataset.views
+    if not views:
+        raise AnyviewError(f"data set {dataset.name}: no demonstration to train on has a second view")
+    chosen = [rng.choice(views[n], 2, replace=False) for n in rng.integers(len(views), size=count)]
+    sources, targets = np.array(chosen).T
+    return FramePairs(sources, targets, rng.integers(dataset.length, size=count))
 
 
 def validation_pairs(dataset: Dataset, rng: np.random.Generator, count: int) -> FramePairs:

@@ -44,6 +44,11 @@ class Objective(Protocol):
         ...
 
     @property
+    def dataset_names(self) -> Sequence[str]:
+        """Of the sets of clips that the training reads."""
+        ...
+
+    @property
     def training(self) -> Training:
         """Batches, learning rate, validation."""
         ...
@@ -103,7 +108,8 @@ def fit(name: str, objective: Objective, output: Path) -> None:
     """
     cell, training, total = objective.cell, objective.training, objective.cell.iterations
     key = [name, cell.model_dump(), training.model_dump(), objective.seed]
-    checkpoints = Checkpoints(checkpoint_folder(key, dataset_files(cell.dataset)))
+    files = [path for dataset in objective.dataset_names for path in dataset_files(dataset)]
+    checkpoints = Checkpoints(checkpoint_folder(key, files))
     live = LIVE_CURVES / f"{name}.csv"
 
     use_threads(1)

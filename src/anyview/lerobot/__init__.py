@@ -1,0 +1,1 @@
+"""LeRobotDataset v3.0, the format of shared demonstrations: episodes as clips, clips as episodes."""

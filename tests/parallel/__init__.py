@@ -1,0 +1,1 @@
+"""Tests of `anyview repro` in toy repositories that know nothing of Anyview."""

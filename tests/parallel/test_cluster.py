@@ -1,0 +1,44 @@
+"""`anyview repro` on a Ray cluster of two nodes on this machine."""
+
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from tests.parallel.toys import DIAMOND, Toy
+
+STORE = {"object_store_memory": 100_000_000}
+
+
+@pytest.fixture
+def cluster() -> Iterator:
+    """Two nodes with one core each; the address is the first one's."""
+    utils = pytest.importorskip("ray.cluster_utils")
+    cluster = utils.Cluster(initialize_head=True, head_node_args={"num_cpus": 1, **STORE})
+    cluster.second = cluster.add_node(num_cpus=1, **STORE)
+    cluster.wait_for_nodes()
+    yield cluster
+    cluster.shutdown()
+
+
+@pytest.mark.slow
+def test_a_cluster_makes_the_lock_of_dvc_repro(tmp_path, cluster):
+    """Two stages meet on the two nodes; then one node dies under a stage, which runs on the other."""
+    backend = {"ANYVIEW_BACKEND": "ray", "RAY_ADDRESS": cluster.address}
+    plain = Toy(tmp_path / "plain", DIAMOND)
+    toy = plain.copy(tmp_path / "toy")
+    plain.run("dvc", "repro", "-q")
+    assert "5 ran" in toy.run("anyview", "repro", **backend)
+    assert toy.read("dvc.lock") == plain.read("dvc.lock")
+
+    text = DIAMOND.replace("sleep 0.2;", "echo $PPID > here-${item}; until [ -e go ]; do sleep 0.05; done;")
+    (toy.folder / "dvc.yaml").write_text(text)
+    process = toy.start("anyview", "repro", **backend)
+    toy.wait_for("here-left", process)
+    toy.wait_for("here-right", process)
+    cluster.remove_node(cluster.second, allow_graceful=False)
+    time.sleep(1)
+    (toy.folder / "go").touch()
+    said, _ = process.communicate(timeout=180)
+    assert process.returncode == 0, said
+    assert "Data and pipelines are up to date." in toy.run("dvc", "repro")
