@@ -182,12 +182,6 @@ class TranslatorCell(Block):
         default=None, description="the cell's own instead of `training.schedule`"
     )
 
-    @model_validator(mode="after")
-    def _some_own_iterations(self) -> "TranslatorCell":
-        if self.pretraining.iterations >= self.iterations:
-            raise ValueError("pretraining.iterations must be below iterations, which count them")
-        return self
-
 
 class EmbeddingCell(Block):
     """Stage `embed`: one time-contrastive embedding, for the `tcn` baseline."""
@@ -458,6 +452,16 @@ def parse_params(values: Any, name: str = "params.yaml") -> Params:
         if found not in fitting:
             listed = ", ".join(fitting) or "none yet"
             raise AnyviewError(f"{name}: {key}: {_brief(found)} is none of these: {listed}")
+    for block, cells in (
+        ("translators", params.translators),
+        ("beyond.translators", params.beyond.translators),
+    ):
+        for key, cell in cells.items():
+            if cell.pretraining.iterations >= cell.iterations:
+                raise AnyviewError(
+                    f"{name}: {block}.{key}.pretraining.iterations: {cell.pretraining.iterations} must be below "
+                    f"{block}.{key}.iterations: {cell.iterations}, which counts them"
+                )
     return params
 
 
@@ -473,6 +477,11 @@ def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
     yield from ((f"beyond.split.{name}", name, list(params.beyond.sets)) for name in params.beyond.split)
     for key, beyond in params.beyond.translators.items():
         yield f"beyond.translators.{key}.dataset", beyond.dataset, list(params.demonstration_sets)
+        yield (
+            f"beyond.translators.{key}.pretraining.dataset",
+            beyond.pretraining.dataset,
+            list(params.demonstration_sets),
+        )
     for key, method in params.beyond.cells.items():
         yield f"beyond.cells.{key}.dataset", method.dataset, list(params.demonstration_sets)
         yield f"beyond.cells.{key}.model", method.model, list(params.translator_cells)
