@@ -21,7 +21,7 @@ COMPILE := pip-compile --quiet --generate-hashes --strip-extras --build-deps-for
 PARALLEL := --numprocesses logical --maxprocesses 4 --dist loadgroup # see tests/conftest.py
 GL_PACKAGES := libegl1 libopengl0 libgl1-mesa-dri libosmesa6
 
-.PHONY: help repro evidence test test-slow lint format bench setup setup-dev lock audit clean
+.PHONY: help repro beyond evidence test test-slow lint format bench setup setup-dev lock audit clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1|/p' Makefile | awk -F'|' '{printf "  make %-10s %s\n", $$1, $$2}'
@@ -29,6 +29,10 @@ help: ## list the targets
 repro: .setup-stamp .setup-stamp-graphics ## run the whole pipeline; only what changed runs again
 	python stages/check.py
 	dvc repro
+
+beyond: .setup-stamp .setup-stamp-graphics ## run what goes beyond the thesis as well, and what it needs of the rest
+	dvc repro check simulate@diverse split@diverse train@sim imitate@ours
+	cd beyond && dvc repro
 
 evidence: .setup-stamp .setup-stamp-graphics ## figure 20 with six translators of each loss: hours, see evidence/dvc.yaml
 	dvc repro check simulate@diverse split@diverse

@@ -73,7 +73,11 @@ def train_group(params: Params, runs: range, contexts: list[Context]) -> tuple[i
     torch.set_num_threads(1)
     clips = make_clips(params, contexts)
     cell = params.imitation.cells["ours"]
-    learner, model, first = make_learner(params, runs), make_translator(params), clips[:, 0].copy()
+    learner, model, first = (
+        make_learner(params, runs, OBSERVATION_SIZE),
+        make_translator(params),
+        clips[:, 0].copy(),
+    )
     targets = translate_demonstrations(model, clips[:2], first)
     reward = DemonstrationReward(model, *targets, first, cell.weights, cell.time_power)
     pushers, watch = PusherBatch(contexts, image_size=params.sim.image_size), Stopwatch()

@@ -43,7 +43,7 @@ def main() -> None:
     positions, _ = roll_out(contexts)
     camera = renderer(params.sim.image_size)
     model = load_translator(options.model)
-    _, demonstrations = imitated_demonstrations(params)
+    demonstrations = imitated_demonstrations(params).frames
     first = np.stack([camera.render_clip(c, p[:1])[0] for c, p in zip(contexts, positions, strict=True)])
     features, images = translate_demonstrations(model, demonstrations, first)
 

@@ -109,7 +109,7 @@ class PlainLoop:
         z1 = model.encode_expert(expert, noise)
         z2, skips = model.encode_context(context, noise)
         z_true = model.encode_expert(target, noise)
-        z3 = model.translate(z1, z2, noise)
+        z3 = model.translate(z1, z2, noise=noise)
         translated, reconstructed = (self._decode(z, skips) for z in (z3, z_true))
         loss = 0.5 * ((translated - target) ** 2).sum() + 0.5 * ((reconstructed - target) ** 2).sum()
         return loss + 1000 * ((z3 - z_true) ** 2).mean()

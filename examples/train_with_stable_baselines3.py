@@ -28,7 +28,7 @@ def main(steps: int) -> None:
         contexts[0], control=params.sim.control, image_size=params.sim.image_size, render_mode="rgb_array"
     )
     translator = load_translator(paths.model("sim"))
-    _, demonstrations = imitated_demonstrations(params)
+    demonstrations = imitated_demonstrations(params).frames
     env = TranslatedReward(pusher, translator, demonstrations, params.imitation.cells["ours"].weights)
 
     model = SAC("MlpPolicy", env, gamma=0.8, learning_starts=490, seed=params.base.seed, verbose=1)

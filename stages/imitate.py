@@ -17,8 +17,10 @@ LEARNERS: dict[str, MakeLearner] = {"ddpg": ddpg.make_learner, "trpo": trpo.make
 def main(arguments: list[str]) -> None:
     """Evaluate one cell; a killed stage continues from its checkpoints."""
     params = load_params()
-    cells = params.imitation.cells
+    cells = {**params.imitation.cells, **params.beyond.cells}
     name = choose(arguments, cells, "python stages/imitate.py CELL")
+    if name in params.beyond.cells:
+        params = params.imitating(name)
     method = Method(LEARNERS[cells[name].learner], make_reward)
     evaluate_method(name, params, method, [paths.model(cells[name].model)])
 

@@ -50,6 +50,7 @@ def simulate_shard(
                 "final_distance": float(distance),
                 "context": context.to_json(),
             }
+            | ({"choice": context.choice.colour} if context.choice else {})
             for position, (context, distance) in enumerate(zip(contexts, distances, strict=True))
         ]
         return {"file": vars(stored), "rows": rows, "acceptance": acceptance}, [stored.file]
@@ -60,8 +61,9 @@ def simulate_shard(
 def main(arguments: list[str]) -> None:
     """Simulate one set; a killed stage continues after the last finished shard."""
     params = load_params()
-    name = choose(arguments, params.simulate.sets, "python stages/simulate.py SET")
-    wanted, shard, size = params.simulate.sets[name], params.simulate.shard, params.sim.image_size
+    sets = params.demonstration_sets
+    name = choose(arguments, sets, "python stages/simulate.py SET")
+    wanted, shard, size = sets[name], params.simulate.shard, params.sim.image_size
     folder = checkpoint_folder(["simulate", params.base.seed, name, wanted.contexts, shard, size])
 
     counts = [min(shard, wanted.demos - first) for first in range(0, wanted.demos, shard)]

@@ -14,9 +14,9 @@ from anyview.video.splits import split_pairs
 def main(arguments: list[str]) -> None:
     """Split one set."""
     params = load_params()
-    name = choose(arguments, params.split, "python stages/split.py SET")
+    name = choose(arguments, params.splits, "python stages/split.py SET")
     manifest = paths.clip_set(name) / "manifest.csv"
-    train, validation = params.split[name].train, params.split[name].validation
+    train, validation = params.splits[name].train, params.splits[name].validation
     if name == paths.REAL:
         clips = read_table(manifest, ["clip", "pair", "kind"], unique="clip")
     elif name == paths.RENDERED:

@@ -14,8 +14,8 @@ from anyview.video.datasets import open_dataset
 def main(arguments: list[str]) -> None:
     """Train one cell; an interrupted training continues."""
     params = load_params()
-    name = choose(arguments, params.translators, "python stages/train.py CELL")
-    cell = params.translators[name]
+    name = choose(arguments, params.translator_cells, "python stages/train.py CELL")
+    cell = params.translator_cells[name]
     pretraining = open_dataset(cell.pretraining.dataset) if cell.pretraining.iterations else None
     objective = TranslatorObjective(
         cell, params.training, params.base.seed, open_dataset(cell.dataset), pretraining

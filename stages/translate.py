@@ -16,9 +16,9 @@ from anyview.video.datasets import open_dataset
 def main(arguments: list[str]) -> None:
     """Evaluate the translator of one cell."""
     params = load_params()
-    name = choose(arguments, params.translators, "python stages/translate.py CELL")
+    name = choose(arguments, params.translator_cells, "python stages/translate.py CELL")
     model = load_translator(paths.model(name))
-    dataset = open_dataset(params.translators[name].dataset)
+    dataset = open_dataset(params.translator_cells[name].dataset)
     with whole_folder(paths.translations(name)) as folder:
         rng = stream(params.base.seed, f"translate/{name}")
         evaluate(model, dataset, folder, params.assessment, rng)

@@ -24,6 +24,7 @@ load_mujoco()
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+@pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Tests of one file go to one process, and those that need the whole pipeline all to the first."""
     for item in items:

@@ -79,6 +79,22 @@ def test_the_committed_params_are_sound():
             "translators.sim.dataset: 'wide' is none of these: diverse, narrow",
         ),
         ("split.wide", {"validation": 0.1}, "split.wide: 'wide' is none of these: diverse, narrow, real"),
+        (
+            "beyond.cells.choice.model",
+            "tcn",
+            "beyond.cells.choice.model: 'tcn' is none of these: real-adam, ",
+        ),
+        (
+            "beyond.translators.sim-choice.dataset",
+            "real",
+            "beyond.translators.sim-choice.dataset: 'real' is none of these: diverse, narrow, choice",
+        ),
+        ("beyond.sets.wide", {"contexts": "choice", "demos": 4}, "beyond.split.wide: missing key"),
+        (
+            "beyond.cells.ours",
+            VALUES["beyond"]["cells"]["choice"],
+            "beyond.cells.ours: the name is taken by imitation.cells or adversarial.cells",
+        ),
         ("simulate.sets", {"wide": {"contexts": "diverse", "demos": 4}}, "split.wide: missing key"),
         (
             "simulate.sets.rendered",
@@ -154,7 +170,7 @@ def test_the_committed_params_are_sound():
         (
             "imitation.cells.ours.reward",
             "gail",
-            "imitation.cells.ours.reward: Input should be 'translated', 'true' or 'embedding'",
+            "imitation.cells.ours.reward: Input should be 'translated', 'true', 'clock' or 'embedding'",
         ),
         (
             "evidence.translators",

@@ -67,8 +67,9 @@ class Sim(Block):
 class DemonstrationSet(Block):
     """One set of simulated demonstrations."""
 
-    contexts: Literal["diverse", "narrow"] = Field(
-        description="`diverse`: seen from anywhere, with distractors; `narrow`: from four sides, without"
+    contexts: Literal["diverse", "narrow", "choice"] = Field(
+        description="`diverse`: seen from anywhere, with distractors; `narrow`: from four sides, without; "
+        "`choice`: as diverse, with a red goal and a green one, of which a demonstration goes to either"
     )
     demos: Count = Field(description="demonstrations to render")
 
@@ -173,15 +174,13 @@ class TranslatorCell(Block):
     )
     pretraining: Pretraining
     augment: bool = Field(description="augment the contexts during training")
+    task_embedding: bool = Field(
+        default=False,
+        description="give T the mean of Enc1 over 8 frames of the expert's clip; not in the thesis",
+    )
     schedule: Literal["constant", "cosine"] | None = Field(
         default=None, description="the cell's own instead of `training.schedule`"
     )
-
-    @model_validator(mode="after")
-    def _some_own_iterations(self) -> "TranslatorCell":
-        if self.pretraining.iterations >= self.iterations:
-            raise ValueError("pretraining.iterations must be below iterations, which count them")
-        return self
 
 
 class EmbeddingCell(Block):
@@ -281,8 +280,9 @@ class DemonstrationCell(Block):
     """One method rewarded by a demonstration in the agent's own view (equations 20 to 22)."""
 
     learner: Literal["ddpg", "trpo"]
-    reward: Literal["translated", "true"] = Field(
-        description="what is matched: the translated demonstrations, or the true one (the oracle)"
+    reward: Literal["translated", "true", "clock"] = Field(
+        description="what is matched: the translated demonstrations, the true one (the oracle), or what the "
+        "translator makes of no clip but the time step (the clock)"
     )
     model: str = Field(description="the translator: a cell of `translators`")
     weights: RewardWeights
@@ -331,6 +331,27 @@ class Adversarial(Block):
     cells: dict[Name, AdversarialCell]
 
 
+class BeyondCell(DemonstrationCell):
+    """One method of the studies beyond the thesis, with the runs and learners of `imitation`."""
+
+    dataset: str = Field(
+        description="simulated set whose held-out clips are imitated; where they choose between two goals, "
+        "every context is run twice, once for each"
+    )
+    demonstrations: Count = Field(
+        description="clips that are imitated, of each choice; of a `clock`, training clips that it averages"
+    )
+
+
+class Beyond(Block):
+    """What goes beyond the thesis, by the pipeline beyond/dvc.yaml: sets and cells as in the blocks above."""
+
+    sets: dict[Name, DemonstrationSet]
+    split: dict[Name, SplitSet]
+    translators: dict[Name, TranslatorCell]
+    cells: dict[Name, BeyondCell]
+
+
 class Evidence(Block):
     """Pipeline `evidence`: the translators of figure 20, each trained several times, as models of `ours`."""
 
@@ -364,11 +385,47 @@ class Params(Block):
     assessment: Assessment
     imitation: Imitation
     adversarial: Adversarial
+    beyond: Beyond
     evidence: Evidence
 
     @property
+    def demonstration_sets(self) -> dict[str, DemonstrationSet]:
+        """Every simulated set, of the thesis and beyond."""
+        return {**self.simulate.sets, **self.beyond.sets}
+
+    @property
+    def splits(self) -> dict[str, SplitSet]:
+        """How every set of clips is split."""
+        return {**self.split, **self.beyond.split}
+
+    @property
+    def translator_cells(self) -> dict[str, TranslatorCell]:
+        """Every translator, of the thesis and beyond."""
+        return {**self.translators, **self.beyond.translators}
+
+    def going_beyond(self, *beside: str) -> "Params":
+        """These params with the sets and cells of `beyond`, and methods ``beside`` them, for the thesis's."""
+        cells = {**self.beyond.cells, **{name: self.imitation.cells[name] for name in beside}}
+        return self.model_copy(
+            update={
+                "simulate": self.simulate.model_copy(update={"sets": self.beyond.sets}),
+                "split": self.beyond.split,
+                "translators": self.beyond.translators,
+                "embeddings": {},
+                "imitation": self.imitation.model_copy(update={"cells": cells}),
+                "adversarial": self.adversarial.model_copy(update={"cells": {}}),
+            }
+        )
+
+    def imitating(self, name: str) -> "Params":
+        """These params with the cell ``name`` of `beyond` as one of `imitation`, which has its clips."""
+        cell = self.beyond.cells[name]
+        changed = {"dataset": cell.dataset, "demonstrations": cell.demonstrations, "cells": {name: cell}}
+        return self.model_copy(update={"imitation": self.imitation.model_copy(update=changed)})
+
+    @property
     def methods(self) -> dict[str, DemonstrationCell | EmbeddingRewardCell | AdversarialCell]:
-        """Every method that is evaluated, by its cell's name."""
+        """Every method of the thesis's study, by its cell's name."""
         return {**self.imitation.cells, **self.adversarial.cells}
 
 
@@ -395,6 +452,16 @@ def parse_params(values: Any, name: str = "params.yaml") -> Params:
         if found not in fitting:
             listed = ", ".join(fitting) or "none yet"
             raise AnyviewError(f"{name}: {key}: {_brief(found)} is none of these: {listed}")
+    for block, cells in (
+        ("translators", params.translators),
+        ("beyond.translators", params.beyond.translators),
+    ):
+        for key, cell in cells.items():
+            if cell.pretraining.iterations >= cell.iterations:
+                raise AnyviewError(
+                    f"{name}: {block}.{key}.pretraining.iterations: {cell.pretraining.iterations} must be below "
+                    f"{block}.{key}.iterations: {cell.iterations}, which counts them"
+                )
     return params
 
 
@@ -407,6 +474,17 @@ def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
     """Names in ``params`` that must be those of other keys: (dotted key, name, the names that fit)."""
     sets = [*params.simulate.sets, REAL, RENDERED]
     yield from ((f"split.{name}", name, sets) for name in params.split)
+    yield from ((f"beyond.split.{name}", name, list(params.beyond.sets)) for name in params.beyond.split)
+    for key, beyond in params.beyond.translators.items():
+        yield f"beyond.translators.{key}.dataset", beyond.dataset, list(params.demonstration_sets)
+        yield (
+            f"beyond.translators.{key}.pretraining.dataset",
+            beyond.pretraining.dataset,
+            list(params.demonstration_sets),
+        )
+    for key, method in params.beyond.cells.items():
+        yield f"beyond.cells.{key}.dataset", method.dataset, list(params.demonstration_sets)
+        yield f"beyond.cells.{key}.model", method.model, list(params.translator_cells)
     for block, models in (("translators", params.translators), ("embeddings", params.embeddings)):
         yield from ((f"{block}.{key}.dataset", cell.dataset, sets) for key, cell in models.items())
     for key, translator in params.translators.items():
@@ -420,18 +498,31 @@ def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
 
 def _refuse_twins(params: Params, name: str) -> None:
     """Refuse two cells that would write to one folder, and a set of clips that is never split."""
+    made = [*params.simulate.sets, REAL, RENDERED]
     for block, key, other, taken in (
         ("embeddings", params.embeddings, "translators", params.translators),
         ("adversarial.cells", params.adversarial.cells, "imitation.cells", params.imitation.cells),
         ("simulate.sets", params.simulate.sets, "the clips that stage ingest makes", [REAL]),
+        ("beyond.sets", params.beyond.sets, "simulate.sets, ingest or render", made),
+        (
+            "beyond.translators",
+            params.beyond.translators,
+            "translators or embeddings",
+            [*params.translators, *params.embeddings],
+        ),
+        ("beyond.cells", params.beyond.cells, "imitation.cells or adversarial.cells", params.methods),
         ("simulate.sets", params.simulate.sets, "the clips that stage render makes", [RENDERED]),
     ):
         for cell in key:
             if cell in taken:
                 raise AnyviewError(f"{name}: {block}.{cell}: the name is taken by {other}")
-    for dataset in (*params.simulate.sets, REAL, RENDERED):
-        if dataset not in params.split:
-            raise AnyviewError(f"{name}: split.{dataset}: missing key")
+    for block, sets, split in (
+        ("split", made, params.split),
+        ("beyond.split", params.beyond.sets, params.beyond.split),
+    ):
+        for dataset in sets:
+            if dataset not in split:
+                raise AnyviewError(f"{name}: {block}.{dataset}: missing key")
 
 
 def _explain(error: ValidationError) -> str:
@@ -449,7 +540,7 @@ def _explain(error: ValidationError) -> str:
         message = first["msg"].removeprefix("Value error, ")
         if first["type"].startswith("union_tag"):
             key += ".reward"
-            message = "Input should be 'translated', 'true' or 'embedding'"
+            message = "Input should be 'translated', 'true', 'clock' or 'embedding'"
         if not isinstance(first["input"], dict | list | set):  # aliases can make these endless
             message += f", got {_brief(first['input'])}"
     return f"{key}: {message}" + (f" (and {len(others)} more)" if others else "")

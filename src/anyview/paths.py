@@ -5,6 +5,7 @@ from pathlib import Path
 DATA = Path("data")
 METRICS = Path("metrics")
 REPORT = DATA / "report"
+BEYOND = DATA / "beyond"  # the report on what goes beyond the thesis
 
 REAL = "real"  # the set of clips that ingest makes
 RENDERED = "rendered"  # the set that stage render makes; the others are simulated

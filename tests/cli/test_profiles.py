@@ -57,7 +57,7 @@ def test_comments_and_other_values_stay(params):
 
 
 def test_a_changed_value_means_no_profile(params):
-    params.write_text(params.read_text().replace("demos: 4000", "demos: 4001"))
+    params.write_text(params.read_text().replace("demos: 4000", "demos: 4001", 1))
     assert active_profile() is None
     assert differences("default") == {"simulate.sets.diverse.demos": (4001, 4000)}
 

@@ -6,10 +6,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from anyview.pusher.batch import MAX_TWIST, TOLERANCE, PusherBatch
-from anyview.pusher.contexts import sample_contexts
+from anyview.pusher.batch import MAX_TWIST, TOLERANCE, PusherBatch, observation_size
+from anyview.pusher.contexts import COLOURS, sample_contexts
 from anyview.pusher.expert import roll_out
-from anyview.pusher.scene import model
+from anyview.pusher.scene import ARENA_CENTRE, ARENA_RADIUS, model
 
 CONTEXTS, _ = sample_contexts(np.random.default_rng(11), 5)
 
@@ -91,3 +91,31 @@ def test_expert_succeeds_in_unseen_contexts_on_one_time_profile() -> None:
     assert speed[:, :13].max() < 1e-6  # nobody touches the object before the push
     assert (speed[:, 22:38].min(axis=1) > 0.004).all()  # everybody pushes at the same steps
     assert speed[:, 44:].max() < 1e-3  # and rests at the same steps
+
+
+def test_the_expert_reaches_either_goal_on_the_same_time_profile() -> None:
+    contexts, _ = sample_contexts(np.random.default_rng(123456789), 1000, "choice")
+    for colour in COLOURS:
+        positions, distances = roll_out([context.choosing(colour) for context in contexts])
+        assert (distances < TOLERANCE).mean() >= 0.99
+        speed = np.linalg.norm(np.diff(positions[:, :, 3:], axis=1), axis=-1)
+        assert speed[:, :13].max() < 1e-6
+        assert speed[:, 44:].max() < 1e-3
+
+
+def test_an_observation_does_not_tell_which_goal_counts() -> None:
+    contexts, _ = sample_contexts(np.random.default_rng(4), 6, "choice")
+    red, green = (PusherBatch([context.choosing(colour) for context in contexts]) for colour in COLOURS)
+    np.testing.assert_array_equal(red.reset(), green.reset())
+    for actions in np.random.default_rng(5).uniform(-1, 1, (20, 6, 3)):
+        seen = red.step(actions)
+        np.testing.assert_array_equal(seen, green.step(actions))
+    np.testing.assert_array_equal(red.render(), green.render())
+    assert seen.shape == (6, observation_size(2)) == (6, 17)
+    goals = np.array([context.goals for context in contexts])  # red, then green
+    places = ARENA_CENTRE + ARENA_RADIUS * seen[:, 12:16].reshape(6, 2, 2)
+    np.testing.assert_allclose(places, goals, atol=1e-6)
+    np.testing.assert_array_equal(seen[:, 16], np.full(6, 2 * 20 / 49 - 1, np.float32))
+    np.testing.assert_array_equal(red.distance(), green.other_distance())
+    np.testing.assert_array_equal(red.other_distance(), green.distance())
+    assert (red.distance() != red.other_distance()).all()

@@ -5,7 +5,12 @@ import pytest
 import torch
 
 from anyview.config import RewardWeights
-from anyview.rewards.demonstration import DemonstrationReward, translate_demonstrations, true_demonstrations
+from anyview.rewards.demonstration import (
+    DemonstrationReward,
+    translate_clock,
+    translate_demonstrations,
+    true_demonstrations,
+)
 from anyview.translator.network import ContextTranslator
 from anyview.video.pixels import to_input
 
@@ -103,3 +108,32 @@ def test_batches_do_not_change_a_translation(translator, expert_clips) -> None:
     together = translate_demonstrations(translator, expert_clips[:2], expert_clips[2:5, 0])
     for one, many in zip(alone, together, strict=True):
         torch.testing.assert_close(one[0], many[1], atol=1e-5, rtol=1e-5)
+
+
+def test_the_clock_translates_the_mean_of_the_features(translator, expert_clips) -> None:
+    """And the mean of one clip is that clip."""
+    clips, first = expert_clips[:3], expert_clips[3:, 0]
+    features, images = translate_clock(translator, clips, first)
+    for t in (1, 49):
+        z1 = sum(translator.encode_expert(to_input(clip[t][None])) for clip in clips) / 3
+        z2, skips = translator.encode_context(to_input(first[1][None]))
+        z3 = translator.translate(z1, z2)
+        torch.testing.assert_close(features[1, t - 1], z3[0], rtol=1e-4, atol=1e-5)
+        torch.testing.assert_close(images[1, t - 1], translator.decode(z3, skips)[0], rtol=1e-4, atol=1e-5)
+    alone = (
+        translate(translator, clips[:1], first) for translate in (translate_clock, translate_demonstrations)
+    )
+    for one, other in zip(*alone, strict=True):
+        torch.testing.assert_close(one, other)
+
+
+@pytest.mark.parametrize("task_embedding", [True, False])
+def test_a_task_embedding_is_of_the_whole_clip(expert_clips, task_embedding: bool) -> None:
+    """The same frame, in a clip that ends elsewhere, is translated otherwise."""
+    torch.manual_seed(0)
+    model = ContextTranslator("compact", 32, task_embedding).eval().requires_grad_(False)
+    clips, first = expert_clips[:1].copy(), expert_clips[3:, 0]
+    before, _ = translate_demonstrations(model, clips, first)
+    clips[:, 40:] = expert_clips[1, 40:]
+    after, _ = translate_demonstrations(model, clips, first)
+    assert torch.equal(before[:, 5], after[:, 5]) != task_embedding

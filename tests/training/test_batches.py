@@ -32,6 +32,29 @@ def test_training_pairs_are_two_training_clips_at_one_time(discs):
         assert np.array_equal(target[n], discs.frames[pairs.targets[n], pairs.times[n]])
 
 
+def test_training_pairs_share_the_choice_where_there_is_one(discs):
+    clips = discs.clips.assign(choice=np.resize(["red", "green", "green"], len(discs.clips)))
+    chosen = Dataset("choice", discs.frames, clips)
+    pairs = training_pairs(chosen, np.random.default_rng(0), 5000)
+    choices = clips["choice"].to_numpy()
+    assert (choices[pairs.sources] == choices[pairs.targets]).all()
+    assert (pairs.sources != pairs.targets).all()
+    for side in (pairs.sources, pairs.targets):  # each clip as often as any other
+        counts = np.bincount(side, minlength=len(clips))[chosen.split("train")]
+        assert abs(counts - counts.mean()).max() < 6 * np.sqrt(counts.mean())
+    held_out = validation_pairs(chosen, np.random.default_rng(0), 20)
+    assert (choices[held_out.sources] == choices[held_out.targets]).all()
+    assert set(held_out.targets) == set(chosen.split("validation"))
+
+
+def test_the_frames_to_embed_are_those_of_the_clips_i(discs):
+    pairs = FramePairs(np.array([3, 1]), np.array([0, 2]), np.array([5, 6]))
+    frames = pairs.clips(discs, np.array([0, 4, 11]))
+    assert frames.shape == (2, 3, 16, 16, 3)
+    assert np.array_equal(frames[0, 1], discs.frames[3, 4])
+    assert np.array_equal(frames[1, 2], discs.frames[1, 11])
+
+
 def test_views_are_of_one_demonstration_to_train_on():
     pairs = ["a", "b", "a", "c", "b", "d", "d"]
     splits = ["train"] * 5 + ["validation"] * 2

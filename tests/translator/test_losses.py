@@ -121,3 +121,30 @@ def test_a_loss_that_is_off_is_not_computed(model, batch):
     assert found.reconstruction is None
     assert found.alignment is None
     assert [bool(torch.isnan(part)) for part in found.parts()] == [False, True, True]
+
+
+def test_the_task_embedding_is_the_mean_of_enc1_over_the_clip(batch):
+    torch.manual_seed(3)
+    model = ContextTranslator("compact", 16, task_embedding=True)
+    (expert, target), context, clip = batch[0].chunk(2), batch[1], torch.rand(6, 8, 3, 16, 16)
+    with torch.no_grad():
+        z2, skips = model.encode_context(context)
+        task = sum(model.encode_expert(clip[:, k]) for k in range(8)) / 8
+        z1 = model.encode_expert(expert)
+        hidden = F.linear(torch.cat((z1, z2, task), 1), *model.translation.hidden.parameters())
+        z3 = F.linear(F.leaky_relu(hidden, 0.2), *model.translation.output.parameters())
+        translated = model.decode(z3, skips)
+    found = batch_losses(model, *batch, clip)
+    assert found.translation.item() == pytest.approx(frame_loss(translated, target).item(), rel=1e-4)
+    # Another clip is another task, for the translation alone.
+    other = batch_losses(model, *batch, clip.flip(3))
+    assert other.translation.item() != found.translation.item()
+    assert other.reconstruction.item() == found.reconstruction.item()
+
+
+def test_a_clip_is_embedded_by_the_middles_of_equal_parts():
+    model = ContextTranslator("compact", 16, task_embedding=True)
+    z1 = torch.randn(48, 256)
+    torch.testing.assert_close(model.embed_task(z1), z1[3::6].mean(0, keepdim=True))
+    assert model.embed_task(z1[:3]).shape == (1, 256)
+    assert ContextTranslator("compact", 16).embed_task(z1) is None

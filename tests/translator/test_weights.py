@@ -79,3 +79,14 @@ def test_an_impossible_architecture_is_refused(saved, architecture):
     (folder / "model.json").write_text(json.dumps(meta | {"architecture": architecture}))
     with pytest.raises(AnyviewError, match="architecture"):
         load_translator(folder)
+
+
+def test_a_translator_with_a_task_embedding_comes_back_with_it(tmp_path):
+    torch.manual_seed(1)
+    model = ContextTranslator("compact", 16, task_embedding=True)
+    save_translator(tmp_path, model, {})
+    loaded = load_translator(tmp_path)
+    z1, z2 = torch.randn(2, 9, 256)
+    with torch.no_grad():
+        expected = model.translate(z1, z2, model.embed_task(z1))
+        assert torch.equal(loaded.translate(z1, z2, loaded.embed_task(z1)), expected)

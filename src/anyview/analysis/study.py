@@ -94,7 +94,10 @@ class AssessedTranslator:
 
 @dataclass(frozen=True)
 class EvaluatedMethod:
-    """A method: a row per run, a row per iteration and run, and the clips that it imitates."""
+    """A method: a row per run, a row per iteration and run, and the clips that it imitates.
+
+    Where the clips choose between two goals, runs have ``context``, ``choice`` and ``other_distance``.
+    """
 
     folder: Path
     runs: pd.DataFrame
@@ -157,7 +160,7 @@ def read_study(params: Params, root: Path = Path()) -> Study:
         return {name: path for name, path in found.items() if path.exists()}
 
     simulated = present(paths.clip_set, params.simulate.sets)
-    real = present(paths.clip_set, [paths.REAL])
+    real = present(paths.clip_set, [paths.REAL] if paths.REAL in params.split else [])
     splits = present(paths.split_table, params.split)
     models = present(paths.model, params.translators)
     translations = present(paths.translations, params.translators)
@@ -201,19 +204,24 @@ def _translator(folder: Path) -> AssessedTranslator:
 
 def read_method(folder: Path) -> EvaluatedMethod:
     """Read one method's folder; AnyviewError names a broken file."""
-    runs = _numbers(folder / "runs.csv", ["run", "success", "final_distance"])
+    runs = _numbers(folder / "runs.csv", ["run", "success", "final_distance"], text="choice")
     curve = _numbers(folder / "curve.csv", ["iteration", "run", "final_distance", "return"])
     demonstrations = read_table(folder / "demonstrations.csv", ["clip"])["clip"]
     return EvaluatedMethod(folder, runs.sort_values("run", ignore_index=True), curve, tuple(demonstrations))
 
 
-def _numbers(path: Path, columns: list[str]) -> pd.DataFrame:
-    """A table whose columns are numbers; empty cells are NaN, but not in the columns that must be there."""
+def _numbers(path: Path, columns: list[str], text: str = "") -> pd.DataFrame:
+    """A table whose columns are numbers; empty cells are NaN, but not in the columns that must be there.
+
+    A column ``text`` stays as it is.
+    """
     table = read_table(path, columns)
-    for column in table.columns:
-        text = table[column]
-        table[column] = pd.to_numeric(text.replace({"True": 1, "False": 0, "": None}), errors="coerce")
-        if (table[column].isna() & (text != "")).any() or (column in columns and table[column].isna().any()):
+    for column in table.columns.drop(text, errors="ignore"):
+        written = table[column]
+        table[column] = pd.to_numeric(written.replace({"True": 1, "False": 0, "": None}), errors="coerce")
+        if (table[column].isna() & (written != "")).any() or (
+            column in columns and table[column].isna().any()
+        ):
             raise AnyviewError(f"{path}: column {column} holds something that is no number")
     if table.empty:
         raise AnyviewError(f"{path}: it has no rows")

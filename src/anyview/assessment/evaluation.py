@@ -39,11 +39,10 @@ def translate_clip(model: ContextTranslator, clip: np.ndarray, context: np.ndarr
     """``clip``, uint8 (T, H, W, 3), as the context of the frame ``context`` (H, W, 3) would show it."""
     device = next(model.parameters()).device
     z2, skips = model.encode_context(to_input(context[None]).to(device))
-    translated = []
-    for frames in np.array_split(clip, -(-len(clip) // 64)):
-        z1 = model.encode_expert(to_input(frames).to(device))
-        translated.append(to_frames(model.decode(model.translate(z1, z2.expand_as(z1)), skips)))
-    return np.concatenate(translated)
+    parts = np.array_split(clip, -(-len(clip) // 64))
+    encoded = [model.encode_expert(to_input(frames).to(device)) for frames in parts]
+    task = model.embed_task(torch.cat(encoded))
+    return np.concatenate([to_frames(model.decode(model.translate(z1, z2, task), skips)) for z1 in encoded])
 
 
 @torch.inference_mode()
@@ -57,7 +56,8 @@ def evaluate_clip(model: ContextTranslator, dataset: Dataset, source: int, targe
     expert, true = (to_input(dataset.frames[clip]).to(device) for clip in (source, target))
     z2, skips = model.encode_context(true[:1])
     z_true = model.encode_expert(true)
-    z3 = model.translate(model.encode_expert(expert), z2.expand_as(z_true))
+    z1 = model.encode_expert(expert)
+    z3 = model.translate(z1, z2, model.embed_task(z1))
     skip_terms = model.decoder.skip_terms(skips)
     translated = model.decoder(z3, skip_terms)
     losses = [

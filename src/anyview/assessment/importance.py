@@ -45,11 +45,12 @@ def _rises(
     device = next(model.parameters()).device
     expert, true = (to_input(dataset.frames[clip]).to(device) for clip in pair)
     z1 = model.encode_expert(expert)
+    task = model.embed_task(z1)  # of the clip as it is: a frame is replaced where T reads its time step
     z2, skips = model.encode_context(true[:1])
     skip_terms = model.decoder.skip_terms(skips)
 
     def losses(features: torch.Tensor) -> torch.Tensor:
-        translated = model.decoder(model.translate(features, z2.expand_as(features)), skip_terms)
+        translated = model.decoder(model.translate(features, z2, task), skip_terms)
         return FRAME_SCALE * (translated - true).square().sum((1, 2, 3))
 
     replaced = torch.stack([losses(z1.roll(-int(offset), dims=0)) for offset in offsets])

@@ -16,10 +16,10 @@ from anyview.pusher.batch import (
     ACTION_SIZE,
     ACTIONS,
     OBSERVATION_LIMIT,
-    OBSERVATION_SIZE,
     TOLERANCE,
     PusherBatch,
     finite_actions,
+    observation_size,
 )
 from anyview.pusher.contexts import Context, Kind, sample_contexts
 
@@ -44,9 +44,10 @@ class PusherEnv(gym.Env):
         render_mode: str | None = None,
     ):
         _check_choices(kind, control)
-        self.observation_space, self.action_space = _spaces()
         self.render_mode = render_mode
         self._context = None if context is None else _checked_context(context)
+        self._goals = _goals([] if context is None else [context], kind)
+        self.observation_space, self.action_space = _spaces(self._goals)
         self._kind, self._control, self._image_size = kind, control, image_size
         self._batch: PusherBatch | None = None
 
@@ -54,7 +55,7 @@ class PusherEnv(gym.Env):
         """Start an episode; ``options={"context": ...}`` chooses its context."""
         super().reset(seed=seed)
         _check_options(options, "context")
-        context = _checked_context(options["context"]) if options else self._context
+        context = _checked_context(options["context"], self._goals) if options else self._context
         self._batch = PusherBatch(
             [context or _draw(self.np_random, self._kind)], self._control, self._image_size
         )
@@ -98,7 +99,7 @@ class PusherVectorEnv(VectorEnv):
             raise ValueError(f"{len(contexts)} contexts for {num_envs} environments")
         _check_choices(kind, control)
         self.num_envs = num_envs
-        self.single_observation_space, self.single_action_space = _spaces()
+        self.single_observation_space, self.single_action_space = _spaces(_goals(contexts or [], kind))
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.render_mode = render_mode
@@ -156,9 +157,18 @@ class PusherVectorEnv(VectorEnv):
         }
 
 
-def _spaces() -> tuple[gym.spaces.Box, gym.spaces.Box]:
+def _goals(contexts: Sequence[Context], kind: str) -> int:
+    """Goals in every one of ``contexts``, or without any in those of ``kind``."""
+    counts = {len(context.goals) for context in contexts} or {2 if kind == "choice" else 1}
+    if len(counts) > 1:
+        raise ValueError("contexts: some have one goal and some have two")
+    return counts.pop()
+
+
+def _spaces(goals: int) -> tuple[gym.spaces.Box, gym.spaces.Box]:
     """The spaces of observations and actions, new for each environment: a space has a random generator."""
-    observations = gym.spaces.Box(-OBSERVATION_LIMIT, OBSERVATION_LIMIT, (OBSERVATION_SIZE,), np.float32)
+    shape = (observation_size(goals),)
+    observations = gym.spaces.Box(-OBSERVATION_LIMIT, OBSERVATION_LIMIT, shape, np.float32)
     return observations, gym.spaces.Box(-1.0, 1.0, (ACTION_SIZE,), np.float32)
 
 
@@ -175,9 +185,11 @@ def _check_choices(kind: str, control: str) -> None:
             raise ValueError(f"{name} {value!r}: must be {' or '.join(choices)}")
 
 
-def _checked_context(context: Any) -> Context:
+def _checked_context(context: Any, goals: int | None = None) -> Context:
     if not isinstance(context, Context):
         raise ValueError(f"context: expected a Context (see anyview.pusher.contexts), got {context!r}")
+    if goals is not None and len(context.goals) != goals:
+        raise ValueError(f"context: it has {len(context.goals)} goals, but the environment is for {goals}")
     return context
 
 

@@ -1,30 +1,52 @@
 """The clips of the expert: those that agents imitate, and those that discriminators learn from."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from anyview import paths
 from anyview.config import Params
-from anyview.pusher.contexts import Context
+from anyview.pusher.contexts import COLOURS, Colour, Context
 from anyview.runtime.errors import AnyviewError
 from anyview.seeds import stream
 from anyview.video.sets import FrameStore, open_frames
 from anyview.video.splits import read_split
 
 
-def imitated_demonstrations(params: Params) -> tuple[list[str], np.ndarray]:
-    """Clips of the validation split, the same for every cell and run: ids, and frames (m, 50, H, W, 3).
+class Clips(NamedTuple):
+    """Clips of the expert: ids, and frames (m, 50, H, W, 3)."""
+
+    names: list[str]
+    frames: np.ndarray
+
+
+def imitated_demonstrations(params: Params, choice: Colour | None = None) -> Clips:
+    """Clips of the validation split, the same for every cell and run; with ``choice`` of that choice.
 
     Raises AnyviewError where the split holds out fewer, or the frames are of another size than the agents'.
     """
-    store, rows = _split_rows(params, "validation")
-    wanted = params.imitation.demonstrations
-    if len(rows) < wanted:
-        table = paths.split_table(params.imitation.dataset)
-        raise AnyviewError(
-            f"params.yaml: imitation.demonstrations: {wanted}, but {table} holds out {len(rows)} clips"
-        )
-    chosen = np.sort(stream(params.base.seed, "imitated").choice(rows, wanted, replace=False))
-    return list(store.manifest["clip"].iloc[chosen]), np.stack([store.frames[row] for row in chosen])
+    store, rows = _split_rows(params, "validation", choice)
+    return _draw(params, store, rows, params.imitation.demonstrations, "imitated", f"holds out {len(rows)}")
+
+
+def clock_clips(params: Params) -> Clips:
+    """Clips of the training split, evenly of each choice where there is one: their mean tells the time alone.
+
+    Raises AnyviewError where the split has fewer, or the frames are of another size than the agents'.
+    """
+    choices = COLOURS if two_goals(params) else (None,)
+    parts = []
+    for choice in choices:
+        store, rows = _split_rows(params, "train", choice)
+        wanted = -(-params.imitation.demonstrations // len(choices))
+        parts.append(_draw(params, store, rows, wanted, "clock", f"trains on {len(rows)}"))
+    names = [name for part in parts for name in part.names]
+    return Clips(names, np.concatenate([part.frames for part in parts]))
+
+
+def two_goals(params: Params) -> bool:
+    """Whether the demonstrations choose between two goals."""
+    return params.demonstration_sets[params.imitation.dataset].contexts == "choice"
 
 
 def training_clips(params: Params) -> tuple[np.ndarray, np.ndarray, list[Context]]:
@@ -39,7 +61,17 @@ def training_clips(params: Params) -> tuple[np.ndarray, np.ndarray, list[Context
     return store.frames, rows, [Context.from_json(text) for text in store.manifest["context"].iloc[rows]]
 
 
-def _split_rows(params: Params, split: str) -> tuple[FrameStore, np.ndarray]:
+def _draw(
+    params: Params, store: FrameStore, rows: np.ndarray, wanted: int, name: str, there_are: str
+) -> Clips:
+    if len(rows) < wanted:
+        table = paths.split_table(params.imitation.dataset)
+        raise AnyviewError(f"params.yaml: imitation.demonstrations: {wanted}, but {table} {there_are} clips")
+    chosen = np.sort(stream(params.base.seed, name).choice(rows, wanted, replace=False))
+    return Clips(list(store.manifest["clip"].iloc[chosen]), np.stack([store.frames[row] for row in chosen]))
+
+
+def _split_rows(params: Params, split: str, choice: Colour | None = None) -> tuple[FrameStore, np.ndarray]:
     folder = paths.clip_set(params.imitation.dataset)
     store = open_frames(folder)
     made, size = store.frames.shape[2], params.sim.image_size
@@ -47,4 +79,7 @@ def _split_rows(params: Params, split: str) -> tuple[FrameStore, np.ndarray]:
         raise AnyviewError(f"{folder}: frames of {made} pixels, but sim.image_size is {size}")
     table = read_split(paths.split_table(params.imitation.dataset))
     members = set(table["clip"][table["split"] == split])
-    return store, np.flatnonzero(store.manifest["clip"].isin(members))
+    wanted = store.manifest["clip"].isin(members)
+    if choice is not None:
+        wanted &= store.manifest["choice"] == choice
+    return store, np.flatnonzero(wanted)

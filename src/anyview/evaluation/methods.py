@@ -43,7 +43,8 @@ class Scoring:
     fixed: bool
 
 
-MakeLearner = Callable[[Params, Sequence[int]], Learner]
+MakeLearner = Callable[[Params, Sequence[int], int], Learner]
+"""From params, numbers of the runs and the size of an observation."""
 MakeReward = Callable[[Group], Scoring]
 
 

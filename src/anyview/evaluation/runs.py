@@ -11,7 +11,7 @@ import pandas as pd
 from anyview.config import Params
 from anyview.evaluation.methods import Group, Method, Scoring
 from anyview.learners.common.interfaces import Arrays, Learner, RewardSource
-from anyview.pusher.batch import FRAMES, TOLERANCE, PusherBatch
+from anyview.pusher.batch import FRAMES, TOLERANCE, PusherBatch, observation_size
 from anyview.pusher.contexts import Context
 from anyview.pusher.episodes import Act, Moment, episode, film
 from anyview.pusher.expert import roll_out
@@ -64,17 +64,20 @@ def evaluate_group(
     positions, _ = roll_out(contexts)
     own = _film(params, contexts, positions)
     group = Group(params, params.methods[name], runs, contexts, demonstrations, own)
-    learner, scoring = method.make_learner(params, runs), method.make_reward(group)
+    learner = method.make_learner(params, runs, observation_size(len(contexts[0].goals)))
+    scoring = method.make_reward(group)
     label = f"{name}, runs {runs[0]} to {runs[-1]}"
     curve = _train(label, group, learner, scoring, Checkpoints(scratch))
 
-    agent, distance = _perform(group, learner)
+    agent, distance, other = _perform(group, learner)
     columns = {
         "run": list(runs),
         "success": (distance < TOLERANCE).astype(int),
         "final_distance": distance,
         "return_policy": _returns(scoring, agent),
     }
+    if other is not None:
+        columns["other_distance"] = other
     if scoring.fixed:
         without_object = positions.copy()
         without_object[:, :, 3:] = positions[:, :1, 3:]
@@ -170,10 +173,14 @@ def _final_distance(batch: PusherBatch, learner: Learner) -> np.ndarray:
     return batch.distance()
 
 
-def _perform(group: Group, learner: Learner) -> tuple[np.ndarray, np.ndarray]:
-    """An episode without noise: frames (R, 50, H, W, 3), and the final distances (R,) in metres."""
+def _perform(group: Group, learner: Learner) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    """An episode without noise: frames (R, 50, H, W, 3), and the final distances (R,) in metres.
+
+    The second distances are to the goals that do not count, where there are any.
+    """
     batch = PusherBatch(group.contexts, group.params.sim.control, group.params.sim.image_size)
-    return film(batch, _greedy(learner)), batch.distance()
+    frames = film(batch, _greedy(learner))
+    return frames, batch.distance(), batch.other_distance() if group.contexts[0].choice else None
 
 
 def _greedy(learner: Learner) -> Act:

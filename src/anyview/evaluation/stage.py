@@ -10,11 +10,11 @@ import pandas as pd
 
 from anyview import paths
 from anyview.config import Params
-from anyview.evaluation.demonstrations import imitated_demonstrations
+from anyview.evaluation.demonstrations import Clips, clock_clips, imitated_demonstrations, two_goals
 from anyview.evaluation.methods import Method
 from anyview.evaluation.runs import evaluate_group, groups_of
 from anyview.learners.common.policies import save_policies
-from anyview.pusher.contexts import sample_contexts
+from anyview.pusher.contexts import COLOURS, Colour, Context, Kind, sample_contexts
 from anyview.runtime.outputs import whole_folder, write_atomically
 from anyview.runtime.scratch import checkpoint_folder
 from anyview.runtime.workers import run_tasks
@@ -34,21 +34,33 @@ def evaluate_method(name: str, params: Params, method: Method, sources: Sequence
     - ``policy-<run>.safetensors`` and ``policy.json``: see ``learners.common.policies``;
     - ``rollouts/run-<run>.avi``: the agent's frames with the imitated demonstration to their right;
     - ``demonstrations.csv``: the clips that are imitated.
+
+    Where the demonstrations choose between two goals, every context is run twice: first all of them with
+    clips of the one choice, then all with clips of the other. ``runs.csv`` has the columns ``context`` and
+    ``choice`` then, and ``demonstrations.csv`` has ``choice``.
     """
-    contexts, _ = sample_contexts(stream(params.base.seed, "evaluation"), params.imitation.runs)
-    chosen, demonstrations = imitated_demonstrations(params)
-    groups = groups_of(len(contexts), params.imitation.group)
+    imitated = _imitated(name, params)
+    numbers = groups_of(params.imitation.runs, params.imitation.group)
     values, files = _origin(name, params, sources)
-    scratch = [checkpoint_folder([*values, index], files) for index in range(len(groups))]
-    tasks = [
-        (name, params, method, group, [contexts[run] for run in group], demonstrations, folder)
-        for group, folder in zip(groups, scratch, strict=True)
-    ]
+    tasks: list[tuple[Any, ...]] = []
+    acted: list[Context] = []
+    shown = []
+    for choice, contexts, clips in imitated:
+        for group in numbers:
+            runs = [len(acted) + run for run in group]
+            scratch = checkpoint_folder([*values, len(tasks)], files)
+            theirs = [contexts[run] for run in group]
+            tasks.append((name, params, method, runs, theirs, clips.frames, scratch))
+        acted += contexts
+        shown.append(pd.DataFrame({"clip": clips.names} | ({"choice": choice} if choice else {})))
     results = list(run_tasks(evaluate_group, tasks))
     runs = pd.concat([result.runs for result in results], ignore_index=True)
     curve = pd.concat([result.curve for result in results], ignore_index=True)
+    if len(imitated) > 1:
+        runs.insert(1, "context", runs["run"] % params.imitation.runs)
+        runs.insert(2, "choice", [context.choice.colour for context in acted if context.choice])
     with whole_folder(paths.policies(name)) as output:
-        write_atomically(output / "demonstrations.csv", pd.DataFrame({"clip": chosen}).to_csv(index=False))
+        write_atomically(output / "demonstrations.csv", pd.concat(shown).to_csv(index=False))
         write_atomically(output / "runs.csv", runs.to_csv(index=False))
         write_atomically(output / "curve.csv", curve.sort_values(["iteration", "run"]).to_csv(index=False))
         weights = {
@@ -56,14 +68,29 @@ def evaluate_method(name: str, params: Params, method: Method, sources: Sequence
             for each in results[0].policies
         }
         learner, sim = params.methods[name].learner, params.sim
-        save_policies(output, weights, contexts, learner, sim.control, sim.image_size)
+        save_policies(output, weights, acted, learner, sim.control, sim.image_size)
         (output / "rollouts").mkdir()
         for run, rollout in enumerate(np.concatenate([result.rollouts for result in results])):
             write_video(output / "rollouts" / f"run-{run:02d}.avi", rollout, RATE)
-    for folder in scratch:
-        shutil.rmtree(folder)
+    for *_, scratch in tasks:
+        shutil.rmtree(scratch)
     distance = 100 * runs["final_distance"].median()
     print(f"{name}: {runs['success'].sum()} of {len(runs)} succeed; median distance {distance:.1f} cm")
+
+
+def _imitated(name: str, params: Params) -> list[tuple[Colour | None, list[Context], Clips]]:
+    """For each choice, or the only task: the contexts to act in and the clips that are imitated there."""
+    kind: Kind = "choice" if two_goals(params) else "diverse"
+    rng = stream(params.base.seed, "evaluation" if kind == "diverse" else f"evaluation/{kind}")
+    contexts, _ = sample_contexts(rng, params.imitation.runs, kind)
+
+    def clips(choice: Colour | None = None) -> Clips:
+        clock = params.methods[name].reward == "clock"
+        return clock_clips(params) if clock else imitated_demonstrations(params, choice)
+
+    if kind == "diverse":
+        return [(None, contexts, clips())]
+    return [(choice, [context.choosing(choice) for context in contexts], clips(choice)) for choice in COLOURS]
 
 
 def _origin(name: str, params: Params, sources: Sequence[Path]) -> tuple[list[Any], list[Path]]:

@@ -27,7 +27,7 @@ from anyview.learners.common.noise import ornstein_uhlenbeck
 from anyview.learners.common.policies import with_time_features
 from anyview.learners.common.replay import Replay
 from anyview.learners.common.stacked import Adam, StackedMLP
-from anyview.pusher.batch import ACTION_SIZE, ACTIONS, OBSERVATION_SIZE
+from anyview.pusher.batch import ACTION_SIZE, ACTIONS
 from anyview.runtime.device import torch_device
 from anyview.seeds import stream
 
@@ -248,14 +248,14 @@ class DDPG:
         }
 
 
-def make_learner(params: config.Params, runs: Sequence[int]) -> DDPG:
+def make_learner(params: config.Params, runs: Sequence[int], observation_size: int) -> DDPG:
     """Untrained learners for ``runs`` of the pusher."""
     imitation = params.imitation
     return DDPG(
         imitation.ddpg,
         params.base.seed,
         runs,
-        OBSERVATION_SIZE,
+        observation_size,
         ACTION_SIZE,
         horizon=ACTIONS,
         copies=imitation.episodes_per_iteration,

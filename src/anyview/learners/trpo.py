@@ -14,7 +14,7 @@ from torch import Tensor
 
 from anyview import config
 from anyview.learners.common.interfaces import Arrays
-from anyview.pusher.batch import ACTION_SIZE, ACTIONS, OBSERVATION_SIZE
+from anyview.pusher.batch import ACTION_SIZE, ACTIONS
 from anyview.seeds import stream
 
 _LINE_SEARCH_STEPS = 12
@@ -316,6 +316,6 @@ def policy_step(
     return result
 
 
-def make_learner(params: config.Params, runs: Sequence[int]) -> TRPO:
+def make_learner(params: config.Params, runs: Sequence[int], observation_size: int) -> TRPO:
     """Untrained learners for ``runs`` of the pusher."""
-    return TRPO(params.imitation.trpo, params.base.seed, runs, OBSERVATION_SIZE, ACTION_SIZE, ACTIONS)
+    return TRPO(params.imitation.trpo, params.base.seed, runs, observation_size, ACTION_SIZE, ACTIONS)

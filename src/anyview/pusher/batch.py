@@ -24,7 +24,7 @@ from anyview.pusher.scene import (
 from anyview.trigonometry import unit_vector
 
 ACTION_SIZE = 3
-OBSERVATION_SIZE = 15
+OBSERVATION_SIZE = 15  # with one goal; a second one adds its place
 OBSERVATION_LIMIT = 3.0  # entries are clipped to this; a normal episode stays within about 1
 TOLERANCE = 0.02  # metres from object to goal in the last frame: success
 MAX_TWIST = np.array([0.9, 0.9, 3.0])  # m/s, m/s, rad/s at action 1
@@ -39,11 +39,15 @@ __all__ = [
     "TOLERANCE",
     "PusherBatch",
     "finite_actions",
+    "observation_size",
 ]
 
 
 class PusherBatch:
-    """``len(contexts)`` pushers. An episode is a reset and ``ACTIONS`` steps, the same for all of them."""
+    """``len(contexts)`` pushers. An episode is a reset and ``ACTIONS`` steps, the same for all of them.
+
+    All contexts have one goal, or all have two.
+    """
 
     def __init__(self, contexts: Sequence[Context], control: str = "twist", image_size: int = 64):
         self.contexts = list(contexts)
@@ -53,6 +57,7 @@ class PusherBatch:
         self._image_size = image_size
         self._start = np.array([[*c.arm_qpos, *c.object_xy] for c in self.contexts])
         self._goal = np.array([c.goal_xy for c in self.contexts])
+        self._goals = np.array([c.goals for c in self.contexts])
         self._batch = mujoco.batch.Batch(model(control), nsim=self.count, nthread=1)
         self._qpos, self._qvel, self._ctrl = (self._batch.bind(name) for name in ("qpos", "qvel", "ctrl"))
 
@@ -62,7 +67,7 @@ class PusherBatch:
         return _continued, (self.contexts, self._control, self._image_size, self.steps, state)
 
     def reset(self) -> np.ndarray:
-        """Put every pusher at its context's start; observations (N, OBSERVATION_SIZE)."""
+        """Put every pusher at its context's start; observations (N, O)."""
         self._batch.reset()
         self._qpos[:] = self._start
         self._qvel[:] = 0
@@ -70,7 +75,7 @@ class PusherBatch:
         return self.observations()
 
     def step(self, actions: np.ndarray) -> np.ndarray:
-        """Act for 0.1 s with ``actions`` (N, 3) in [-1, 1]; observations (N, OBSERVATION_SIZE) float32.
+        """Act for 0.1 s with ``actions`` (N, 3) in [-1, 1]; observations (N, O) float32.
 
         Raises ValueError if an action is not finite, or their shape is another.
         """
@@ -91,10 +96,10 @@ class PusherBatch:
         return self.observations()
 
     def observations(self) -> np.ndarray:
-        """(N, OBSERVATION_SIZE) float32, each entry about in [-1, 1].
+        """(N, O) float32, each entry about in [-1, 1], O is ``observation_size``.
 
-        Joint angles (3) and speeds (3), tool position (2) and heading as sine and cosine (2), object (2) and
-        goal (2), time (1).
+        Joint angles (3) and speeds (3), tool position (2) and heading as sine and cosine (2), object (2),
+        goal (2), or both goals in the order of ``COLOURS`` (4), time (1).
         """
         joints = self._qpos[:, :3]
         tool = tool_pose(joints)
@@ -104,7 +109,7 @@ class PusherBatch:
             _in_arena(tool[:, :2]),
             unit_vector(tool[:, 2])[:, ::-1],
             _in_arena(self._qpos[:, 3:]),
-            _in_arena(self._goal),
+            _in_arena(self._goals).reshape(self.count, -1),
             np.full((self.count, 1), 2 * self.steps / ACTIONS - 1),
         ]
         return np.concatenate(parts, axis=-1).clip(-OBSERVATION_LIMIT, OBSERVATION_LIMIT).astype(np.float32)
@@ -116,6 +121,11 @@ class PusherBatch:
     def distance(self) -> np.ndarray:
         """Metres (N,) from the object's centre to the goal's."""
         return np.linalg.norm(self._qpos[:, 3:] - self._goal, axis=-1)
+
+    def other_distance(self) -> np.ndarray:
+        """Metres (N,) from the object's centre to the goal that does not count, where there are two."""
+        others = np.array([c.choice.other_xy for c in self.contexts if c.choice is not None])
+        return np.linalg.norm(self._qpos[:, 3:] - others, axis=-1)
 
     def render(self) -> np.ndarray:
         """What each context's camera sees: (N, H, W, 3) uint8 RGB."""
@@ -130,6 +140,11 @@ def _continued(
     pushers.steps = steps
     pushers._batch.state[:] = state
     return pushers
+
+
+def observation_size(goals: int) -> int:
+    """Entries of an observation where there are one or two ``goals``."""
+    return OBSERVATION_SIZE + 2 * (goals - 1)
 
 
 def finite_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:

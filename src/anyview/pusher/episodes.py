@@ -13,7 +13,7 @@ class Moment(NamedTuple):
 
     step: int
     observations: np.ndarray
-    """(N, OBSERVATION_SIZE)."""
+    """(N, O), as ``PusherBatch.observations`` has them."""
     actions: np.ndarray
     """The actions (N, 3) that led here; zeros at the start."""
 

@@ -25,6 +25,12 @@ def push_pose(object_xy: np.ndarray, goal_xy: np.ndarray) -> np.ndarray:
     return np.concatenate([position, direction[..., None]], axis=-1)
 
 
+def final_pose(behind: np.ndarray, goal_xy: np.ndarray) -> np.ndarray:
+    """Tool poses (..., 3) with the object on the goal, after a push from ``behind`` (..., 3)."""
+    position = goal_xy - SEAT * unit_vector(behind[..., 2])
+    return np.concatenate([position, behind[..., 2:]], axis=-1)
+
+
 def minimum_jerk(progress: np.ndarray) -> np.ndarray:
     """Smooth 0 to 1 with zero speed and acceleration at both ends (Flash and Hogan 1985)."""
     s = np.clip(progress, 0, 1)
@@ -35,8 +41,7 @@ def expert_poses(arm_qpos: np.ndarray, object_xy: np.ndarray, goal_xy: np.ndarra
     """Reference tool poses (P, 50, 3) for starts (P, 3), objects (P, 2) and goals (P, 2)."""
     start = tool_pose(arm_qpos)
     behind = push_pose(object_xy, goal_xy)
-    end = behind.copy()
-    end[:, :2] = goal_xy - SEAT * unit_vector(behind[:, 2])
+    end = final_pose(behind, goal_xy)
     turn = behind - start
     turn[:, 2] = wrap(turn[:, 2])
     steps = np.arange(FRAMES)

@@ -14,7 +14,14 @@ import mujoco
 import numpy as np
 
 from anyview.pusher.contexts import Context
-from anyview.pusher.scene import ARENA_CENTRE, CAMERA_DISTANCE, CAMERA_ELEVATION, DISTRACTORS, model
+from anyview.pusher.scene import (
+    ARENA_CENTRE,
+    CAMERA_DISTANCE,
+    CAMERA_ELEVATION,
+    DISTRACTORS,
+    GOAL_COLOURS,
+    model,
+)
 
 _SUPERSAMPLING = 2
 _OFF = ("mjRND_SHADOW", "mjRND_REFLECTION", "mjRND_SKYBOX", "mjRND_HAZE", "mjRND_ADDITIVE", "mjRND_FOG")
@@ -43,7 +50,7 @@ class Renderer:
         self._camera.elevation = CAMERA_ELEVATION
         self._rect = mujoco.MjrRect(0, 0, pixels, pixels)
         self._pixels = np.empty((pixels, pixels, 3), np.uint8)
-        self._goal = self._model.geom("goal").id
+        self._goals = [self._model.geom(name).id for name in GOAL_COLOURS]
         self._distractors = [self._model.geom(f"distractor{i}").id for i in range(DISTRACTORS)]
 
     def render(self, contexts: Sequence[Context], positions: np.ndarray) -> np.ndarray:
@@ -68,8 +75,10 @@ class Renderer:
         return frames
 
     def _dress(self, context: Context) -> None:
-        self._model.geom_pos[self._goal, :2] = context.goal_xy
-        self._model.geom_rgba[self._distractors, 3] = 0
+        self._model.geom_rgba[[*self._goals, *self._distractors], 3] = 0
+        for geom, place in zip(self._goals, context.goals, strict=False):
+            self._model.geom_pos[geom, :2] = place
+            self._model.geom_rgba[geom, 3] = 1
         for geom, distractor in zip(self._distractors, context.distractors, strict=False):
             self._model.geom_pos[geom, :2] = distractor.position
             self._model.geom_rgba[geom, :3] = distractor.colour

@@ -3,7 +3,8 @@
 Designed so that 64x64 pixels carry the task. The camera frames the circular arena at about 2 cm a pixel
 from every azimuth, the object is blue and 10 pixels wide, the goal red and 13, the table matt grey under
 flat light without shadows, and the arm thin and close to the table's grey, so that what changes most between
-frames is the object. The links run above the object: only the cup touches it.
+frames is the object. The links run above the object: only the cup touches it. Some contexts have a second
+goal, green and as wide; in the others it is not drawn.
 """
 
 from functools import cache
@@ -18,7 +19,7 @@ WORKSPACE_RADIUS = 0.62  # metres: a commanded twist never takes the tool furthe
 OBJECT_RADIUS = 0.1
 GOAL_RADIUS = 0.13
 OBJECT_COLOUR = np.array([0.05, 0.15, 0.9])
-GOAL_COLOUR = np.array([0.9, 0.08, 0.08])
+GOAL_COLOURS = {"red": np.array([0.9, 0.08, 0.08]), "green": np.array([0.08, 0.62, 0.12])}
 JOINT_RANGE = np.array([2.8, 2.8, 2.8])  # radians, symmetric
 DISTRACTORS = 5
 
@@ -55,6 +56,11 @@ def _distractor(index: int) -> str:
     return f'<geom name="distractor{index}" class="visual" {shape} pos="0 0 0.015"/>'
 
 
+def _goal(name: str) -> str:
+    shape = f'type="cylinder" size="{GOAL_RADIUS} 0.004" pos="0 0 0.004"'
+    return f'<geom name="{name}" class="visual" {shape} rgba="{_rgba(GOAL_COLOURS[name])}"/>'
+
+
 def _cup() -> str:
     height = _CUP_HEIGHT - _LINK_HEIGHT
     parts = [
@@ -87,10 +93,13 @@ def _actuators(control: str) -> str:
     return "".join(f'<velocity joint="joint{i}" kv="100"/>' for i in range(3))
 
 
+def _rgba(colour: np.ndarray) -> str:
+    return " ".join(map(str, colour)) + " 1"
+
+
 @cache
 def model(control: str) -> mujoco.MjModel:
     """The compiled scene for ``control`` "twist" or "torque". Shared: do not modify it, copy it."""
-    red, blue = (" ".join(map(str, colour)) + " 1" for colour in (GOAL_COLOUR, OBJECT_COLOUR))
     return mujoco.MjModel.from_xml_string(f"""
 <mujoco model="pusher">
   <compiler angle="radian"/>
@@ -120,14 +129,15 @@ def model(control: str) -> mujoco.MjModel:
   <worldbody>
     <light directional="true" dir="-0.2 0.1 -1" diffuse="0.4 0.4 0.4" specular="0 0 0" castshadow="false"/>
     <geom name="table" class="visual" type="plane" size="4 4 1" rgba="{_TABLE}"/>
-    <geom name="goal" class="visual" type="cylinder" size="{GOAL_RADIUS} 0.004" pos="0 0 0.004" rgba="{red}"/>
+    {"".join(map(_goal, GOAL_COLOURS))}
     {"".join(map(_distractor, range(DISTRACTORS)))}
     {_link(0, _link(1, _link(2, _cup())))}
     <body name="object" pos="0 0 {_CUP_HEIGHT}">
       <joint name="object_x" class="object" axis="1 0 0"/>
       <joint name="object_y" class="object" axis="0 1 0"/>
       <geom name="contact" class="object" type="sphere" size="{OBJECT_RADIUS}" mass="0.1" rgba="0 0 0 0"/>
-      <geom name="object" class="visual" type="cylinder" size="{OBJECT_RADIUS} {_CUP_HEIGHT}" rgba="{blue}"/>
+      <geom name="object" class="visual" type="cylinder" size="{OBJECT_RADIUS} {_CUP_HEIGHT}"
+        rgba="{_rgba(OBJECT_COLOUR)}"/>
     </body>
   </worldbody>
   <actuator>{_actuators(control)}</actuator>

@@ -33,6 +33,8 @@ def picture(name: str) -> str:
 def render_page(markdown: str, illustrations: Illustrations, study: Study, pipeline: Any) -> str:
     """The page as HTML. ``pipeline`` is the parsed ``dvc.yaml``."""
     params = study.params.model_dump()
+    stages = read_stages(pipeline, params)
+    del params["beyond"]  # it is another pipeline's, or is what stands in place of the thesis's blocks
     templates = environment(autoescape=True)
     templates.filters |= {"svg_uri": svg_uri, "row_uri": row_uri, "subscripts": _subscripts}
     macros = templates.get_template("pictures.html.jinja").module
@@ -42,7 +44,6 @@ def render_page(markdown: str, illustrations: Illustrations, study: Study, pipel
         index for index, token in enumerate(tokens) if token.type == "heading_open" and token.tag == "h2"
     ]
     env: dict[str, Any] = {"illustrations": illustrations, "macros": macros, "open": []}
-    stages = read_stages(pipeline, params)
     hashes = tuple((path.as_posix(), dvc_hash(path)) for path in study.sources)
     return templates.get_template("page.html.jinja").render(
         style=(TEMPLATES / "page.css").read_text(encoding="utf-8"),

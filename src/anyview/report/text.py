@@ -75,7 +75,7 @@ def _context(study: Study, results: Results) -> dict[str, Any]:
     """Tables as the templates read them, and which cells each chapter names."""
     imitation = study.params.imitation
     return {
-        **{name: _by_cell(getattr(results, name)) for name in ("data", "translation", "imitation", "more")},
+        **{name: by_cell(getattr(results, name)) for name in ("data", "translation", "imitation", "more")},
         **{
             name: list(getattr(results, name).itertuples())
             for name in ("loss_points", "optimizers", "weight_ranges", "differences", "effects")
@@ -89,7 +89,7 @@ def _context(study: Study, results: Results) -> dict[str, Any]:
     }
 
 
-def _by_cell(table: pd.DataFrame) -> dict[str, dict[str, Any]]:
+def by_cell(table: pd.DataFrame) -> dict[str, dict[str, Any]]:
     """Rows of a tidy table by cell and metric."""
     return {
         str(cell): {row.metric: row for row in rows.itertuples()}

@@ -9,7 +9,12 @@ from anyview.config import DemonstrationCell, EmbeddingRewardCell
 from anyview.embedding.network import Embedding
 from anyview.embedding.weights import load_embedding
 from anyview.evaluation.methods import Group, Scoring, first_demonstration
-from anyview.rewards.demonstration import DemonstrationReward, translate_demonstrations, true_demonstrations
+from anyview.rewards.demonstration import (
+    DemonstrationReward,
+    translate_clock,
+    translate_demonstrations,
+    true_demonstrations,
+)
 from anyview.rewards.embedding import EmbeddingReward
 from anyview.runtime.device import torch_device
 from anyview.runtime.errors import AnyviewError
@@ -34,7 +39,8 @@ def _demonstrated(group: Group, cell: DemonstrationCell) -> Scoring:
     if cell.reward == "true":
         targets = true_demonstrations(model, group.own)
     else:
-        targets = translate_demonstrations(model, group.demonstrations, first)
+        translate = translate_clock if cell.reward == "clock" else translate_demonstrations
+        targets = translate(model, group.demonstrations, first)
     reward = DemonstrationReward(model, *targets, first, cell.weights, cell.time_power)
     return Scoring(reward, reward.scales, reward.targets(), fixed=True)
 

@@ -103,10 +103,30 @@ def translate_demonstrations(
     """
     device = next(model.parameters()).device
     clips = [_encode(model, clip[1:], device) for clip in demonstrations]
+    return _translate(model, clips, first_frames, device)
+
+
+@torch.inference_mode()
+def translate_clock(
+    model: ContextTranslator, clips: np.ndarray, first_frames: np.ndarray
+) -> tuple[Tensor, Tensor]:
+    """What the translator makes of the mean of Enc1 over ``clips``, which tells it nothing but the time step.
+
+    Shapes as of ``translate_demonstrations``.
+    """
+    device = next(model.parameters()).device
+    mean = torch.stack([_encode(model, clip[1:], device) for clip in clips]).mean(0)
+    return _translate(model, [mean], first_frames, device)
+
+
+def _translate(
+    model: ContextTranslator, clips: Sequence[Tensor], first_frames: np.ndarray, device: torch.device
+) -> tuple[Tensor, Tensor]:
+    """The means over ``clips``, each z1 (T, Z), of their translated features and frames."""
     features, images = [], []
     for frame in first_frames:
         z2, skips = model.encode_context(to_input(torch.from_numpy(frame[None]).to(device)))
-        translated = [model.translate(z1, z2.expand(len(z1), -1)) for z1 in clips]
+        translated = [model.translate(z1, z2, model.embed_task(z1)) for z1 in clips]
         features.append(torch.stack(translated).mean(0))
         images.append(torch.stack([model.decode(z3, skips) for z3 in translated]).mean(0))
     return torch.stack(features), torch.stack(images)

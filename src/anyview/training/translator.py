@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -14,7 +15,7 @@ from anyview.training.augmentation import Augmentation
 from anyview.training.common.batches import FramePairs, training_pairs, training_views, validation_pairs
 from anyview.training.common.optimization import MakeOptimizer
 from anyview.translator.losses import NAMES, Losses, batch_losses
-from anyview.translator.network import ContextTranslator
+from anyview.translator.network import ContextTranslator, task_frames
 from anyview.translator.weights import save_translator
 from anyview.video.datasets import Dataset
 from anyview.video.pixels import to_input
@@ -63,7 +64,9 @@ class TranslatorObjective:
         """With the same first weights for every cell of an architecture: ablations differ in losses alone."""
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(torch_seed(self.seed, "translator/weights"))
-            model = ContextTranslator(self.cell.architecture, self.dataset.image_size)
+            model = ContextTranslator(
+                self.cell.architecture, self.dataset.image_size, self.cell.task_embedding
+            )
         return model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
     def batch(self, iteration: int) -> FramePairs:
@@ -76,17 +79,19 @@ class TranslatorObjective:
         """(4,), with dropout and augmentation."""
         device = next(model.parameters()).device
         dataset = self._learnt_at(iteration)
-        paired, context = _frames(dataset, pairs, device)
+        paired, context, clip = self._frames(dataset, pairs, device)
         if augmentation := self._augmentations.get(dataset.name):
             rng = stream(self.seed, "translator/augmentation", iteration, part)
             expert, target = paired.chunk(2)
-            (expert,) = augmentation(expert[None], pairs.sources, rng)
+            shown = expert[None] if clip is None else torch.cat((expert[None], clip.transpose(0, 1)))
+            expert, *others = augmentation(shown, pairs.sources, rng)
+            clip = torch.stack(others, dim=1) if others else None
             context, target = augmentation(torch.stack((context, target)), pairs.targets, rng)
             paired = torch.cat((expert, target))
         seed = torch_seed(self.seed, "translator/dropout", iteration, part)
         noise = torch.Generator(device).manual_seed(seed)
         with products_in(self.training.precision, device):
-            losses = batch_losses(model, paired, context, self.cell.weights, noise)
+            losses = batch_losses(model, paired, context, clip, self.cell.weights, noise)
         return torch.stack((losses.total(self.cell.weights), *losses.parts()))
 
     def validation(self) -> list[FramePairs]:
@@ -99,7 +104,7 @@ class TranslatorObjective:
         """L_tr, L_rec and L_align, (3,)."""
         device = next(model.parameters()).device
         with products_in(self.training.precision, device):
-            losses = batch_losses(model, *_frames(self.dataset, pairs, device))
+            losses = batch_losses(model, *self._frames(self.dataset, pairs, device))
         return torch.stack(losses.parts())
 
     def validation_row(self, means: Tensor) -> dict[str, float]:
@@ -117,8 +122,15 @@ class TranslatorObjective:
     def _learnt_at(self, iteration: int) -> Dataset:
         return self._pretraining if iteration < self.cell.pretraining.iterations else self.dataset
 
+    def _frames(
+        self, dataset: Dataset, pairs: FramePairs, device: torch.device
+    ) -> tuple[Tensor, Tensor, Tensor | None]:
+        """o_t^i, o_t^j (2N, 3, H, W); o_0^j (N, 3, H, W); frames of the clips i to embed (N, K, 3, H, W)."""
 
-def _frames(dataset: Dataset, pairs: FramePairs, device: torch.device) -> tuple[Tensor, Tensor]:
-    """o_t^i and after them o_t^j (2N, 3, H, W), and o_0^j (N, 3, H, W)."""
-    paired, context = pairs.frames(dataset), pairs.contexts(dataset)
-    return tuple(to_input(torch.from_numpy(frames).to(device)) for frames in (paired, context))  # type: ignore[return-value]
+        def load(frames: np.ndarray) -> Tensor:
+            return to_input(torch.from_numpy(frames).to(device))
+
+        clip = None
+        if self.cell.task_embedding:
+            clip = load(pairs.clips(dataset, task_frames(dataset.length)))
+        return load(pairs.frames(dataset)), load(pairs.contexts(dataset)), clip

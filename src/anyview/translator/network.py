@@ -2,6 +2,9 @@
 
 Enc1(o_t^i) -> z1 reads the expert's frame, Enc2(o_0^j) -> z2 the first frame of the target context,
 T(z1, z2) -> z3, and Dec(z3, skips of Enc2(o_0^j)) is the expert's frame as the target context would show it.
+
+Where the same start can lead to several ends, an early frame does not tell which. There T can be given a task
+embedding of the whole clip as well (after James et al. 2018): the mean of Enc1 over some of its frames.
 """
 
 from collections.abc import Iterable
@@ -20,6 +23,7 @@ ArchitectureName = Literal["real", "sim", "compact"]
 
 _LEAK = 0.2
 _COLOURS = 3
+_TASK_FRAMES = 8
 
 
 @dataclass(frozen=True)
@@ -90,17 +94,17 @@ class Encoder(nn.Module):
 
 
 class Translation(nn.Module):
-    """T: the concatenated features (N, width) of both encoders -> z3 (N, width)."""
+    """T: the concatenated features, two or three of (N, width) -> z3 (N, width)."""
 
-    def __init__(self, architecture: Architecture):
+    def __init__(self, architecture: Architecture, inputs: int):
         super().__init__()
-        self.hidden = nn.Linear(2 * architecture.width, architecture.width)
+        self.hidden = nn.Linear(inputs * architecture.width, architecture.width)
         self.output = nn.Linear(architecture.width, architecture.width)
         self._dropout = architecture.dropout
 
-    def forward(self, z1: Tensor, z2: Tensor, noise: Generator | None = None) -> Tensor:
-        both = torch.cat((z1, z2), dim=1)
-        hidden = _activate(self.hidden(_drop(both, self._dropout, noise)))
+    def forward(self, features: list[Tensor], noise: Generator | None = None) -> Tensor:
+        joined = torch.cat(features, dim=1)
+        hidden = _activate(self.hidden(_drop(joined, self._dropout, noise)))
         return self.output(_drop(hidden, self._dropout, noise))
 
 
@@ -183,15 +187,20 @@ def _drop(x: Tensor, probability: float, noise: Generator | None) -> Tensor:
     return x * torch.empty_like(x).bernoulli_(keep, generator=noise).div_(keep)
 
 
+def task_frames(length: int) -> np.ndarray:
+    """Steps of a clip of ``length`` frames that its task embedding is made of: the middles of equal parts."""
+    return ((np.arange(_TASK_FRAMES) + 0.5) * length / _TASK_FRAMES).astype(int)
+
+
 class ContextTranslator(nn.Module):
-    """The whole translator for square frames of ``image_size`` pixels.
+    """The whole translator for square frames of ``image_size`` pixels; ``task_embedding``: T is given one.
 
     Dropout, where the architecture has any, is on where a method is given the generator ``noise`` to draw its
     masks from, and off otherwise, whatever mode the module is in.
     Raises ``AnyviewError`` for an unknown architecture or a size that its strides do not divide.
     """
 
-    def __init__(self, architecture: ArchitectureName, image_size: int):
+    def __init__(self, architecture: ArchitectureName, image_size: int, task_embedding: bool = False):
         super().__init__()
         if architecture not in ARCHITECTURES:
             raise AnyviewError(f"architecture {architecture!r}: must be one of {', '.join(ARCHITECTURES)}")
@@ -202,11 +211,12 @@ class ContextTranslator(nn.Module):
             )
         self.architecture = architecture
         self.image_size = image_size
+        self.task_embedding = task_embedding
         self.width = layers.width
         self.expert_encoder = Encoder(layers, image_size)
         # In `real` both encoders are one module: its weights are shared, and stored once.
         self.context_encoder = self.expert_encoder if layers.shared else Encoder(layers, image_size)
-        self.translation = Translation(layers)
+        self.translation = Translation(layers, 3 if task_embedding else 2)
         self.decoder = Decoder(layers, image_size)
 
     @property
@@ -222,9 +232,16 @@ class ContextTranslator(nn.Module):
         """Enc2: z2 (N, width) of first frames (N, 3, H, W), and the four maps that the decoder skips to."""
         return self.context_encoder(frames, noise)
 
-    def translate(self, z1: Tensor, z2: Tensor, noise: Generator | None = None) -> Tensor:
-        """T: z3 (N, width) of z1 (N, width) and z2 (N, width)."""
-        return self.translation(z1, z2, noise)
+    def embed_task(self, z1: Tensor) -> Tensor | None:
+        """The task embedding (1, width) of a clip, of its z1 (T, width); None where T is given none."""
+        return z1[task_frames(len(z1))].mean(0, keepdim=True) if self.task_embedding else None
+
+    def translate(
+        self, z1: Tensor, z2: Tensor, task: Tensor | None = None, noise: Generator | None = None
+    ) -> Tensor:
+        """T: z3 (N, width) of z1 (N, width), z2 and the ``task`` embedding, each (N, width) or (1, width)."""
+        features = [z1, z2] if task is None else [z1, z2, task]
+        return self.translation([each.expand_as(z1) for each in features], noise)
 
     def decode(self, z: Tensor, skips: list[Tensor]) -> Tensor:
         """Dec: frames (N, 3, H, W) of z (N, width) and the skips of K contexts, where K divides N.

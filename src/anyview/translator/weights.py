@@ -19,7 +19,10 @@ def save_translator(folder: Path, model: ContextTranslator, meta: dict[str, Any]
         for name, value in model.state_dict().items()
         if not (model.shared and name.startswith("context_encoder."))
     }
-    write_model(folder, state, {"architecture": model.architecture, "image_size": model.image_size, **meta})
+    layers = {"architecture": model.architecture, "image_size": model.image_size}
+    if model.task_embedding:
+        layers["task_embedding"] = True
+    write_model(folder, state, {**layers, **meta})
 
 
 def read_meta(folder: Path) -> dict[str, Any]:
@@ -36,7 +39,7 @@ def load_translator(folder: Path) -> ContextTranslator:
     Raises AnyviewError if a file is missing, damaged or does not fit the other.
     """
     meta = read_meta(folder)
-    model = ContextTranslator(meta["architecture"], meta["image_size"])
+    model = ContextTranslator(meta["architecture"], meta["image_size"], meta.get("task_embedding") is True)
 
     def restore(state: dict[str, Tensor]) -> None:
         if model.shared:

@@ -35,6 +35,13 @@ class Dataset:
         """Indices of the clips of a split, in the order of the manifest."""
         return self._splits.get(name, np.empty(0, int))
 
+    def same_choice(self, clips: np.ndarray) -> list[np.ndarray]:
+        """``clips`` in groups of what the expert chose to do; in one where there was nothing to choose."""
+        if "choice" not in self.clips:
+            return [clips]
+        choices = self.clips["choice"].to_numpy()[clips]
+        return [clips[choices == choice] for choice in np.unique(choices)]
+
     @cached_property  # training asks at every iteration
     def _splits(self) -> dict[str, np.ndarray]:
         names = self.clips["split"].to_numpy()
@@ -64,8 +71,10 @@ def open_dataset(name: str) -> Dataset:
     clips = clips.merge(split, on="clip", how="left").fillna({"pair": "", "split": ""})
     dataset = Dataset(name, store.frames, clips)
     for wanted, least in (("train", 2), ("validation", 1)):
-        if len(dataset.split(wanted)) < least:
-            raise AnyviewError(f"{table}: split {wanted} needs at least {least} clips")
+        groups = dataset.same_choice(dataset.split(wanted))
+        if min(map(len, groups), default=0) < least:
+            of_each = " of each choice" if "choice" in clips else ""
+            raise AnyviewError(f"{table}: split {wanted} needs at least {least} clips{of_each}")
     return dataset
 
 
@@ -78,8 +87,8 @@ def dataset_files(name: str) -> list[Path]:
 def clip_pairs(dataset: Dataset, split: str) -> list[tuple[int, int]]:
     """(source, target) clips to evaluate a translator on: every clip of ``split`` once as the target.
 
-    The source is the other view of the target's pair, or the next clip if it has none. An ``extreme``
-    target's source is a standard validation clip.
+    The source is the other view of the target's pair, or the next clip of the same choice if it has none. An
+    ``extreme`` target's source is a standard validation clip.
     """
     targets = dataset.split(split)
     if split == "extreme":
@@ -89,8 +98,13 @@ def clip_pairs(dataset: Dataset, split: str) -> list[tuple[int, int]]:
             sources = sources[standard] if standard.any() else sources
         return [(int(sources[n % len(sources)]), int(target)) for n, target in enumerate(targets)]
     pairs = dataset.clips["pair"].to_numpy()
+    following = {
+        clip: group[(n + 1) % len(group)]
+        for group in dataset.same_choice(targets)
+        for n, clip in enumerate(group)
+    }
     chosen = []
-    for n, target in enumerate(targets):
+    for target in targets:
         others = [clip for clip in targets if clip != target and pairs[clip] == pairs[target]]
-        chosen.append((int(others[0] if others else targets[(n + 1) % len(targets)]), int(target)))
+        chosen.append((int(others[0] if others else following[target]), int(target)))
     return chosen

@@ -47,7 +47,7 @@ class Policy:
     weights: Arrays
 
     def act(self, observation: np.ndarray) -> np.ndarray:
-        """Action (3,) in [-1, 1] for ``observation`` (15,)."""
+        """Action (3,) in [-1, 1] for ``observation`` (O,)."""
         x = torch.from_numpy(np.asarray(observation, np.float32))
         layers = len(self.weights) // 2
         ddpg = self.learner == "ddpg"

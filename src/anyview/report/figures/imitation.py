@@ -30,7 +30,7 @@ def success(rates: pd.DataFrame) -> Figure:
         axis.errorbar(
             100 * rates["value"],
             places,
-            xerr=100 * _errors(rates),
+            xerr=100 * errors(rates),
             fmt="none",
             ecolor=INK,
             capsize=3,
@@ -47,7 +47,7 @@ def success(rates: pd.DataFrame) -> Figure:
                 **THESIS,
             )
         axis.spines["left"].set_visible(False)
-        _name_rows(axis, rates["cell"])
+        name_rows(axis, rates["cell"])
         axis.set(xlim=(-2.5, 100), xlabel="runs that succeed (%)")
         figure.legend(loc="outside upper right", ncols=3)
         return figure
@@ -62,7 +62,7 @@ def differences(table: pd.DataFrame) -> Figure:
             color, marker = styles.get(row.order, (QUIET, "o"))
             axis.plot([row.ratio_low, row.ratio_high], [place, place], color=color, linewidth=2.2)
             axis.plot(row.ratio, place, marker=marker, color=color, markersize=7)
-        _name_rows(axis, table["cell"])
+        name_rows(axis, table["cell"])
         axis.set_xscale("log")
         axis.xaxis.set_major_formatter("{x:g}")
         axis.set(xlabel="times as far as ours (geometric mean, 95%)", title="Nearer  ←  ours  →  farther")
@@ -119,14 +119,14 @@ def returns(shares: pd.DataFrame) -> Figure:
             axis.errorbar(
                 rows["value"],
                 np.arange(len(cells)) + shift,
-                xerr=_errors(rows),
+                xerr=errors(rows),
                 fmt=marker,
                 color=color,
                 markersize=6,
                 capsize=3,
                 label=name,
             )
-        _name_rows(axis, cells)
+        name_rows(axis, cells)
         axis.set(xlabel="return (0: standing still, 1: expert), 95%")
         figure.legend(loc="outside upper right", ncols=2)
         return figure
@@ -142,7 +142,7 @@ def factorial(table: pd.DataFrame) -> Figure:
             axis.errorbar(
                 places,
                 values,
-                yerr=100 * _errors(rows),
+                yerr=100 * errors(rows),
                 color=color,
                 linestyle=dash,
                 marker="os"[index],
@@ -158,12 +158,13 @@ def factorial(table: pd.DataFrame) -> Figure:
         return figure
 
 
-def _errors(rows: pd.DataFrame) -> np.ndarray:
+def errors(rows: pd.DataFrame) -> np.ndarray:
     """How far the bounds lie below and above the values, (2, n)."""
     return np.abs(rows[["low", "high"]].to_numpy() - rows[["value"]].to_numpy()).T
 
 
-def _name_rows(axis: Axes, cells: Iterable[str]) -> None:
+def name_rows(axis: Axes, cells: Iterable[str]) -> None:
+    """A row for each of ``cells``, from top to bottom."""
     names = [mathtext(label(cell)) for cell in cells]
     axis.set_yticks(range(len(names)), names)
     axis.set_ylim(len(names) - 0.4, -0.6)

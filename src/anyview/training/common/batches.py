@@ -35,16 +35,24 @@ class FramePairs:
         clips = np.concatenate((self.sources, self.targets))
         return dataset.frames[clips, np.concatenate((self.times, self.times))]
 
+    def clips(self, dataset: Dataset, times: np.ndarray) -> np.ndarray:
+        """Frames ``times`` (K,) of the clips i, uint8 (N, K, H, W, 3); of pairs of one frame each."""
+        return dataset.frames[self.sources[:, None], times]
+
     def contexts(self, dataset: Dataset) -> np.ndarray:
         """o_0^j, uint8 (N, H, W, 3); of pairs of one frame each."""
         return dataset.frames[self.targets, 0]
 
 
 def training_pairs(dataset: Dataset, rng: np.random.Generator, count: int) -> FramePairs:
-    """``count`` pairs: any two different clips of the training split, at the same random time."""
-    clips = dataset.split("train")
+    """``count`` pairs: any two different clips of the training split and of one choice, at a random time."""
+    groups = dataset.same_choice(dataset.split("train"))
+    clips, sizes = np.concatenate(groups), [len(group) for group in groups]
+    # Of each clip: where its group starts among ``clips``, and the size of its group.
+    start, size = np.repeat(np.cumsum([0, *sizes[:-1]]), sizes), np.repeat(sizes, sizes)
     sources = rng.integers(len(clips), size=count)
-    targets = (sources + rng.integers(1, len(clips), size=count)) % len(clips)
+    further = (rng.integers(1, len(clips), size=count) - 1) % (size[sources] - 1) + 1
+    targets = start[sources] + (sources - start[sources] + further) % size[sources]
     times = rng.integers(dataset.length, size=count)
     return FramePairs(clips[sources], clips[targets], times)
 

@@ -1,0 +1,42 @@
+"""The results of what goes beyond the thesis as tidy tables, and their metrics."""
+
+from dataclasses import dataclass, replace
+
+import pandas as pd
+
+from anyview.analysis.choice import against_choice, choices, choosing
+from anyview.analysis.estimates import Estimator
+from anyview.analysis.metrics import Tree, details
+from anyview.analysis.results import Results, analyse
+from anyview.analysis.study import Study
+
+
+@dataclass(frozen=True)
+class BeyondResults:
+    """``choices`` and ``against_choice``: see ``analysis.choice``; ``others``: all else, as of the thesis."""
+
+    choices: pd.DataFrame
+    against_choice: pd.DataFrame
+    others: Results
+
+
+def analyse_beyond(study: Study) -> BeyondResults:
+    """Compute every table. ``study`` was read by params ``going_beyond``."""
+    estimator = Estimator(study.params.base.seed)
+    alone = {cell: method for cell, method in study.methods.items() if cell not in choosing(study.methods)}
+    return BeyondResults(
+        choices(study.methods, estimator),
+        against_choice(study.methods, estimator),
+        analyse(replace(study, methods=alone)),
+    )
+
+
+def beyond_metrics(results: BeyondResults) -> Tree:
+    """The tree of ``metrics/beyond.json``; ``clock`` and `ours` are in the thesis's own task."""
+    tables = {
+        "data": results.others.data,
+        "translation": results.others.translation,
+        "choice": results.choices,
+        "clock": results.others.imitation,
+    }
+    return {name: details(table) for name, table in tables.items()}

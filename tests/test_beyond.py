@@ -1,0 +1,36 @@
+"""What goes beyond the thesis, at the `smoke` profile, by the real DVC in its own repository."""
+
+import json
+
+import pytest
+
+from anyview.config import load_params
+from tests.conftest import Study
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def beyond(trunk, tmp_path_factory) -> Study:
+    """The whole of beyond/ on top of the trunk."""
+    study = trunk.copy(tmp_path_factory.mktemp("beyond"))
+    study = Study(study.folder / "beyond", study.scratch)
+    study.run("dvc", "repro")
+    return study
+
+
+def test_the_second_run_has_nothing_to_do_and_the_study_does_not_see_the_first(beyond):
+    assert "Data and pipelines are up to date." in beyond.run("dvc", "repro")
+    study = Study(beyond.folder.parent, beyond.scratch)
+    assert "choice" not in study.run("dvc", "status")
+    said = study.run("git", "status", "--porcelain", "beyond")
+    assert said.split() == ["??", "beyond/dvc.lock", "??", "beyond/metrics/"]
+
+
+def test_metrics_and_page_tell_of_every_cell(beyond):
+    cells = load_params(beyond.folder / "params.yaml").beyond.cells
+    metrics = json.loads((beyond.folder / "metrics/beyond.json").read_text())
+    page = (beyond.folder / "data/beyond/index.html").read_text(encoding="utf-8")
+    for cell in cells:
+        assert f'"{cell}"' in json.dumps(metrics), cell
+    assert page.count("<img") >= 2
