@@ -452,16 +452,7 @@ def parse_params(values: Any, name: str = "params.yaml") -> Params:
         if found not in fitting:
             listed = ", ".join(fitting) or "none yet"
             raise AnyviewError(f"{name}: {key}: {_brief(found)} is none of these: {listed}")
-    for block, cells in (
-        ("translators", params.translators),
-        ("beyond.translators", params.beyond.translators),
-    ):
-        for key, cell in cells.items():
-            if cell.pretraining.iterations >= cell.iterations:
-                raise AnyviewError(
-                    f"{name}: {block}.{key}.pretraining.iterations: {cell.pretraining.iterations} must be below "
-                    f"{block}.{key}.iterations: {cell.iterations}, which counts them"
-                )
+    _refuse_pretraining_alone(params, name)
     return params
 
 
@@ -494,6 +485,19 @@ def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
         fitting = params.embeddings if cell.reward == "embedding" else params.translators
         yield f"imitation.cells.{key}.model", cell.model, fitting
     yield from (("evidence.translators", name, params.translators) for name in params.evidence.translators)
+
+
+def _refuse_pretraining_alone(params: Params, name: str) -> None:
+    """Refuse a translator that would never see clips of its own."""
+    blocks = {"translators": params.translators, "beyond.translators": params.beyond.translators}
+    for block, cells in blocks.items():
+        for key, cell in cells.items():
+            before, all_of_them = cell.pretraining.iterations, cell.iterations
+            if before >= all_of_them:
+                raise AnyviewError(
+                    f"{name}: {block}.{key}.pretraining.iterations: {before} must be below "
+                    f"{block}.{key}.iterations, {all_of_them}, which counts them"
+                )
 
 
 def _refuse_twins(params: Params, name: str) -> None:
