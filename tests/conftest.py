@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from filelock import FileLock
 
 from anyview.runtime.graphics import load_mujoco
 from tests.long_stages import LONG_STAGES, change, digests
@@ -24,13 +25,9 @@ load_mujoco()
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-@pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests of one file go to one process, and those that need the whole pipeline all to the first."""
-    for item in items:
-        group = "pipeline" if "smoke" in getattr(item, "fixturenames", ()) else str(item.path)
-        item.add_marker(pytest.mark.xdist_group(group))
-    items.sort(key=lambda item: "smoke" not in getattr(item, "fixturenames", ()))  # the longest first
+    """Files whose tests need the whole pipeline come first: they take longest."""
+    items.sort(key=lambda item: "smoke" not in getattr(item, "fixturenames", ()))
 
 
 @pytest.fixture(scope="session")
@@ -117,20 +114,39 @@ class Study:
 @pytest.fixture(scope="session")
 def trunk(tmp_path_factory) -> Study:
     """The `smoke` profile as far as the clips and the first policy: what single stages need to run."""
-    study = Study(
-        copy_of_the_repository(tmp_path_factory.mktemp("study")), tmp_path_factory.mktemp("scratch")
-    )
-    study.run("anyview", "profile", "smoke")
-    study.run("dvc", "repro", "ingest", "imitate@ours")
-    return study
+
+    def build(folder: Path) -> Study:
+        study = Study(copy_of_the_repository(folder / "study"), folder / "scratch")
+        study.run("anyview", "profile", "smoke")
+        study.run("dvc", "repro", "ingest", "imitate@ours")
+        return study
+
+    return built_once(tmp_path_factory, "trunk", build)
 
 
 @pytest.fixture(scope="session")
 def smoke(trunk, tmp_path_factory) -> Study:
     """The whole pipeline at the `smoke` profile, run once for all tests by the real `dvc repro`."""
-    study = trunk.copy(tmp_path_factory.mktemp("smoke"))
-    study.run("dvc", "repro")
-    return study
+
+    def build(folder: Path) -> Study:
+        study = trunk.copy(folder)
+        study.run("dvc", "repro")
+        return study
+
+    return built_once(tmp_path_factory, "smoke", build)
+
+
+def built_once(tmp_path_factory: pytest.TempPathFactory, name: str, build: Callable[[Path], Study]) -> Study:
+    """A copy of what the first of the processes that share the tests has built in a folder of all."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / name
+    with FileLock(f"{folder}.lock"):
+        if not (folder / "built").exists():
+            shutil.rmtree(folder, ignore_errors=True)
+            folder.mkdir()
+            build(folder)
+            (folder / "built").touch()
+    return Study(folder / "study", folder / "scratch").copy(tmp_path_factory.mktemp(name))
 
 
 @pytest.fixture
