@@ -18,7 +18,7 @@ INSTALL := python -m pip install --quiet
 COMPILE := pip-compile --quiet --generate-hashes --strip-extras --build-deps-for editable \
 	--unsafe-package pip --unsafe-package torch \
 	--no-emit-index-url --no-emit-find-links --no-emit-options --pip-args "$(PIP_ARGS)"
-PARALLEL := --numprocesses logical --maxprocesses 4 --dist loadfile
+PARALLEL := --numprocesses logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 GL_PACKAGES := libegl1 libopengl0 libgl1-mesa-dri libosmesa6
 
 .PHONY: help repro beyond evidence test test-slow lint format bench setup setup-dev lock audit clean

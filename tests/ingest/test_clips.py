@@ -122,7 +122,7 @@ def test_published_clips_open_as_a_set(tmp_path):
     assert store.manifest["clip"].tolist() == ["b", "a"]
     assert store.manifest.columns.tolist() == ["clip", "file", "pair", "camera", "kind"]
     assert pd.read_csv(out / "refused.csv").to_dict("records") == [
-        {"file": "gone.avi", "pair": "gone.avi", "reason": "no such file"}
+        {"file": "gone.avi", "pair": "gone", "reason": "no such file"}
     ]
     for row, clip in zip(store.manifest.itertuples(), store.frames, strict=True):
         raw = read_clip(tmp_path / row.file, LIMITS)

@@ -161,7 +161,7 @@ def test_dropout_is_on_the_inputs_of_all_connected_layers_of_real_and_behind_the
 
         noise = torch.Generator().manual_seed(1)
         torch.testing.assert_close(model.encode_expert(frames, noise), z1)
-        torch.testing.assert_close(model.translate(z1, z1.flip(0), noise), z3)
+        torch.testing.assert_close(model.translate(z1, z1.flip(0), noise=noise), z3)
         decoded = model.decoder(z3, model.decoder.skip_terms(maps), noise)
         torch.testing.assert_close(decoded, convolve_as_stated(model, hidden, maps), rtol=1e-4, atol=1e-5)
 

@@ -99,11 +99,11 @@ class PusherVectorEnv(VectorEnv):
             raise ValueError(f"{len(contexts)} contexts for {num_envs} environments")
         _check_choices(kind, control)
         self.num_envs = num_envs
-        self.single_observation_space, self.single_action_space = _spaces(_goals(contexts or [], kind))
+        self._contexts = None if contexts is None else [_checked_context(context) for context in contexts]
+        self.single_observation_space, self.single_action_space = _spaces(_goals(self._contexts or [], kind))
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.render_mode = render_mode
-        self._contexts = None if contexts is None else [_checked_context(context) for context in contexts]
         self._kind, self._control, self._image_size = kind, control, image_size
         self._generators: list[np.random.Generator] = []
         self._batch: PusherBatch | None = None
