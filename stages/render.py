@@ -57,7 +57,7 @@ def main(arguments: list[str]) -> None:
         raise AnyviewError("usage: python stages/render.py")
     params = load_params()
     wanted, size = params.real.render, params.real.ingest.size
-    folder = checkpoint_folder(["render", params.base.seed, wanted.moments, size])
+    folder = checkpoint_folder(["render", params.base.seed, wanted.model_dump(), size])
 
     everything = range(wanted.demonstrations)
     shards = [everything[first : first + _SHARD] for first in everything[::_SHARD]]

@@ -129,6 +129,9 @@ class Studio:
             kind = getattr(mujoco.mjtGeom, f"mjGEOM_{shape.kind}")
             colour = np.array([*surface.colour, 1.0], np.float32)
             mujoco.mjv_initGeom(geom, kind, np.array(shape.size), shape.position, shape.turn.ravel(), colour)
+            # What mjv_initGeom leaves as the memory happened to be, and differs between processes.
+            geom.category, geom.objtype = mujoco.mjtCatBit.mjCAT_STATIC, mujoco.mjtObj.mjOBJ_UNKNOWN
+            geom.objid, geom.segid, geom.transparent, geom.camdist, geom.modelrbound = -1, -1, 0, 0.0, 0.0
             geom.specular, geom.shininess = surface.specular, surface.shininess
             geom.castshadow = surface.casts_shadow
             geom.texid = -1 if surface.texture is None else surface.texture
