@@ -76,3 +76,17 @@ def test_bodies_turn_and_move_as_one():
             turn @ [0, 0, 1], np.array(direction) / np.linalg.norm(direction), atol=1e-12
         )
         assert np.linalg.det(turn) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("field", ["category", "objtype", "objid", "segid", "transparent", "camdist"])
+def test_a_picture_does_not_depend_on_what_memory_held(field):
+    """MuJoCo leaves these fields of a new shape as they were; a decoration (category 4) has no shadow."""
+    table = box((0.5, 0.5, 0.01), (0, 0, -0.01), Surface((0.8, 0.8, 0.8), casts_shadow=False))
+    ball = capsule((0, 0, 0.02), (0.1, 0, 0.1), 0.03, Surface((0.8, 0.2, 0.2)))
+    pictures = []
+    for held in (0, 1, 4):
+        for geom in studio(192)._scene.geoms[:2]:
+            setattr(geom, field, held)
+        studio(192).arrange([table], [SUN], cameras(), [])
+        pictures.append(studio(192).shoot([ball]))
+    np.testing.assert_array_equal(pictures[1:], [pictures[0]] * 2)

@@ -108,7 +108,8 @@ class Studio:
             eye.pos, eye.forward, eye.up = camera.position, camera.forward, camera.up
             eye.frustum_near, eye.frustum_far, eye.frustum_center = _NEAR, _FAR, 0.0
             eye.frustum_top = _NEAR * math.tan(0.5 * camera.field)
-            eye.frustum_bottom = -eye.frustum_top
+            eye.frustum_bottom, eye.frustum_width = -eye.frustum_top, 0.0  # 0: as wide as it is high
+            eye.orthographic = 0
         for lamp, light in zip(self._scene.lights, lights, strict=False):
             _set_light(lamp, light)
         self._scene.nlight = len(lights)
