@@ -11,7 +11,7 @@ from anyview.config import load_params
 from anyview.report.figures import replicates
 from anyview.report.figures.style import to_svg
 from anyview.report.text import ACTIONS, environment
-from anyview.runtime.errors import AnyviewError, run_stage
+from anyview.runtime.errors import refuse_arguments, run_stage
 from anyview.runtime.outputs import whole_folder
 
 RESULTS = Path("results")
@@ -19,8 +19,7 @@ RESULTS = Path("results")
 
 def main(arguments: list[str]) -> None:
     """Report on every translator and reward of which all seeds were run."""
-    if arguments:
-        raise AnyviewError("usage: python report.py")
+    refuse_arguments(arguments, "python report.py")
     params = load_params()
     runs, curves = read_replicates(params)
     estimator = Estimator(params.base.seed)

@@ -4,7 +4,7 @@ It leaves no output. Where the params are sound but cannot teach anything, it sa
 """
 
 from anyview.config import Params, load_params
-from anyview.runtime.errors import AnyviewError, run_stage
+from anyview.runtime.errors import refuse_arguments, run_stage
 
 
 def notes(params: Params) -> list[str]:
@@ -25,8 +25,7 @@ def notes(params: Params) -> list[str]:
 
 
 def main(arguments: list[str]) -> None:
-    if arguments:
-        raise AnyviewError("usage: python stages/check.py")
+    refuse_arguments(arguments, "python stages/check.py")
     found = notes(load_params())
     print("\n".join(f"note: {note}" for note in found) or "params.yaml: every key is known and possible")
 

@@ -6,7 +6,7 @@ import pandas as pd
 
 from anyview import paths
 from anyview.config import load_params
-from anyview.runtime.errors import AnyviewError, run_stage
+from anyview.runtime.errors import refuse_arguments, run_stage
 from anyview.runtime.outputs import whole_folder, write_atomically
 from anyview.runtime.progress import track
 from anyview.runtime.scratch import checkpoint_folder
@@ -17,8 +17,7 @@ from anyview.video.manifests import times_file
 
 def main(arguments: list[str]) -> None:
     """Film every demonstration; a killed stage continues after the last finished one."""
-    if arguments:
-        raise AnyviewError("usage: python stages/film.py")
+    refuse_arguments(arguments, "python stages/film.py")
     params = load_params()
     wanted = params.real.film
     scratch = checkpoint_folder(["film", params.base.seed, wanted.width])

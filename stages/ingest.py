@@ -5,7 +5,7 @@ import shutil
 from anyview import paths
 from anyview.config import load_params
 from anyview.ingest import clips as ingest
-from anyview.runtime.errors import AnyviewError, run_stage
+from anyview.runtime.errors import AnyviewError, refuse_arguments, run_stage
 from anyview.runtime.outputs import whole_folder
 from anyview.runtime.progress import track
 from anyview.runtime.scratch import checkpoint_folder
@@ -16,8 +16,7 @@ OUTPUT = paths.clip_set(paths.REAL)
 
 def main(arguments: list[str]) -> None:
     """Ingest every clip; a killed stage continues after the last finished one."""
-    if arguments:
-        raise AnyviewError("usage: python stages/ingest.py")
+    refuse_arguments(arguments, "python stages/ingest.py")
     params = load_params().real
     source, limits = paths.raw(params.source), params.ingest
     candidates = ingest.read_candidates(source)

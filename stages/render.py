@@ -9,7 +9,7 @@ import pandas as pd
 
 from anyview import paths
 from anyview.config import load_params
-from anyview.runtime.errors import AnyviewError, run_stage
+from anyview.runtime.errors import refuse_arguments, run_stage
 from anyview.runtime.once import once
 from anyview.runtime.outputs import whole_folder
 from anyview.runtime.progress import track
@@ -53,8 +53,7 @@ def render_shard(
 
 def main(arguments: list[str]) -> None:
     """Render the set; a killed stage continues after the last finished shard."""
-    if arguments:
-        raise AnyviewError("usage: python stages/render.py")
+    refuse_arguments(arguments, "python stages/render.py")
     params = load_params()
     wanted, size = params.real.render, params.real.ingest.size
     folder = checkpoint_folder(["render", params.base.seed, wanted.model_dump(), size])

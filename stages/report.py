@@ -3,13 +3,15 @@
 Usage: python stages/report.py [beyond]
 """
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from anyview.analysis.beyond import analyse_beyond, beyond_metrics
 from anyview.analysis.cells import OURS
 from anyview.analysis.metrics import metrics, write_metrics
 from anyview.analysis.results import analyse
-from anyview.analysis.study import read_study
+from anyview.analysis.study import Study, read_study
 from anyview.config import Params, load_params, read_yaml
 from anyview.paths import BEYOND, METRICS, REPORT
 from anyview.report.beyond import illustrate_beyond, write_beyond
@@ -27,10 +29,7 @@ def report_thesis(params: Params) -> None:
     results = analyse(study)
     trees = metrics(results)
     illustrations = illustrate(study, results)
-    text = write_markdown(study, results, illustrations, picture=lambda name: "")
-    with_pictures = write_markdown(study, results, illustrations, picture)
-    page = render_page(with_pictures, illustrations, study, read_yaml(Path("dvc.yaml")))
-    write_report(REPORT, text, page, illustrations)
+    write_report(REPORT, study, illustrations, partial(write_markdown, study, results, illustrations))
     with whole_folder(METRICS / "plots") as folder:
         write_plots(folder, study, results)
     write_metrics(METRICS, trees)
@@ -42,15 +41,14 @@ def report_beyond(params: Params) -> None:
     results = analyse_beyond(study)
     tree = beyond_metrics(results)
     illustrations = illustrate_beyond(study, results)
-    text = write_beyond(study, results, illustrations, picture=lambda name: "")
-    with_pictures = write_beyond(study, results, illustrations, picture)
-    page = render_page(with_pictures, illustrations, study, read_yaml(Path("dvc.yaml")))
-    write_report(BEYOND, text, page, illustrations)
+    write_report(BEYOND, study, illustrations, partial(write_beyond, study, results, illustrations))
     write_metrics(METRICS, {"beyond": tree})
 
 
-def write_report(output: Path, text: str, page: str, illustrations: Illustrations) -> None:
-    """Write the folder of a report."""
+def write_report(output: Path, study: Study, illustrations: Illustrations, write: Callable[..., str]) -> None:
+    """Write the folder of a report: what ``write(picture=...)`` gives, as text alone and as a page."""
+    text = write(picture=lambda name: "")
+    page = render_page(write(picture=picture), illustrations, study, read_yaml(Path("dvc.yaml")))
     with whole_folder(output) as folder:
         (folder / "figures").mkdir()
         for name, svg in illustrations.figures.items():

@@ -5,20 +5,14 @@ from collections.abc import Iterator
 
 import pytest
 
+from tests.clusters import two_nodes
 from tests.parallel.toys import DIAMOND, Toy
-
-STORE = {"object_store_memory": 100_000_000}
 
 
 @pytest.fixture
 def cluster() -> Iterator:
-    """Two nodes with one core each; the address is the first one's."""
-    utils = pytest.importorskip("ray.cluster_utils")
-    cluster = utils.Cluster(initialize_head=True, head_node_args={"num_cpus": 1, **STORE})
-    cluster.second = cluster.add_node(num_cpus=1, **STORE)
-    cluster.wait_for_nodes()
-    yield cluster
-    cluster.shutdown()
+    with two_nodes() as cluster:
+        yield cluster
 
 
 @pytest.mark.slow

@@ -31,6 +31,12 @@ def choose(arguments: list[str], choices: Iterable[str], usage: str) -> str:
     return arguments[0]
 
 
+def refuse_arguments(arguments: list[str], usage: str) -> None:
+    """Raises AnyviewError if a stage that takes no ``arguments`` is given some."""
+    if arguments:
+        raise AnyviewError(f"usage: {usage}")
+
+
 def run_stage(main: Callable[[list[str]], None]) -> NoReturn:
     """Run a stage's ``main(arguments)`` and exit as a user would expect (see ``exit_code``).
 
