@@ -6,6 +6,7 @@ place. A frame is rendered at twice its size and averaged, so that a shift of a 
 """
 
 import copy
+import threading
 from collections.abc import Sequence
 
 import cv2
@@ -21,7 +22,6 @@ from anyview.pusher.scene import (
     GOAL_COLOURS,
     model,
 )
-from anyview.runtime.graphics import one_a_thread
 
 _SUPERSAMPLING = 2
 _OFF = ("mjRND_SHADOW", "mjRND_REFLECTION", "mjRND_SKYBOX", "mjRND_HAZE", "mjRND_ADDITIVE", "mjRND_FOG")
@@ -97,5 +97,18 @@ class Renderer:
         cv2.resize(self._pixels[::-1], (self._size, self._size), dst=frame, interpolation=cv2.INTER_AREA)
 
 
-renderer = one_a_thread(Renderer)
-"""This thread's renderer for ``image_size``."""
+class _Renderers(threading.local):
+    """Each thread's renderers: an OpenGL context belongs to the thread that made it."""
+
+    def __init__(self) -> None:
+        self.by_size: dict[int, Renderer] = {}
+
+
+_renderers = _Renderers()
+
+
+def renderer(image_size: int) -> Renderer:
+    """This thread's renderer for ``image_size``."""
+    if image_size not in _renderers.by_size:
+        _renderers.by_size[image_size] = Renderer(image_size)
+    return _renderers.by_size[image_size]

@@ -3,14 +3,9 @@
 import os
 import subprocess
 import sys
-import threading
-from collections.abc import Callable
 from types import ModuleType
-from typing import TypeVar
 
 from anyview.runtime.errors import BAD_INPUT, AnyviewError
-
-T = TypeVar("T")
 
 BACKENDS = ("egl", "osmesa")
 MISSING = (
@@ -79,19 +74,6 @@ def load_mujoco() -> ModuleType:
 
         mujoco.GLContext = gl_context.GLContext = NoGraphics
     return mujoco
-
-
-def one_a_thread(make: Callable[[int], T]) -> Callable[[int], T]:
-    """``make(size)``, once for each size and thread: an OpenGL context belongs to the thread that made it."""
-    made = threading.local()
-
-    def get(size: int) -> T:
-        by_size: dict[int, T] = made.__dict__.setdefault("by_size", {})
-        if size not in by_size:
-            by_size[size] = make(size)
-        return by_size[size]
-
-    return get
 
 
 if __name__ == "__main__":

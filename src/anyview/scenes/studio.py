@@ -6,13 +6,14 @@ multisampling, slow in software: pictures are meant to be shrunk.
 """
 
 import math
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from anyview.runtime.graphics import load_mujoco, one_a_thread
+from anyview.runtime.graphics import load_mujoco
 from anyview.scenes.shapes import Colour, Shape
 
 mujoco = load_mujoco()
@@ -152,5 +153,18 @@ def _set_light(lamp: Any, light: Light) -> None:
     lamp.attenuation, lamp.range, lamp.bulbradius = (1.0, 0.0, 0.0), _FAR, 0.02
 
 
-studio = one_a_thread(Studio)
-"""This thread's studio for pictures of ``size`` pixels."""
+class _Studios(threading.local):
+    """Each thread's studios: an OpenGL context belongs to the thread that made it."""
+
+    def __init__(self) -> None:
+        self.by_size: dict[int, Studio] = {}
+
+
+_studios = _Studios()
+
+
+def studio(size: int) -> Studio:
+    """This thread's studio for pictures of ``size`` pixels."""
+    if size not in _studios.by_size:
+        _studios.by_size[size] = Studio(size)
+    return _studios.by_size[size]
