@@ -6,6 +6,7 @@ from hypothesis import HealthCheck, given, settings
 from anyview.parallel.graph import Graph, Node
 from anyview.parallel.needs import Needs
 from anyview.parallel.plan import simulate, ways
+from anyview.parallel.schedule import DONE, Schedule, State
 
 anywhere = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 
@@ -70,3 +71,18 @@ def test_what_is_done_or_running_is_not_done_again(case):
     rest = {name: took for name, took in seconds.items() if name != first}
     assert first not in simulate(graph, seconds, 100, done=[first]).starts
     assert simulate(graph, seconds, 1, running={first: 0.5}).seconds == 0.5 + sum(rest.values())
+
+
+@anywhere
+@given(graphs(), st.booleans(), st.data())
+def test_however_stages_end_the_run_comes_to_its_end(case, fail_fast, data):
+    """A stage that is killed by itself, say by an administrator, leaves nothing waiting for it for ever."""
+    graph, seconds = case
+    schedule = Schedule(graph, ways(graph, seconds), fail_fast)
+    ends = st.sampled_from([State.UNCHANGED, State.CACHED, State.RAN, State.FAILED, State.INTERRUPTED])
+    while ready := schedule.ready():
+        schedule.start(ready[0])
+        schedule.finish(ready[0], data.draw(ends))
+    assert schedule.over
+    for address in schedule.of(*DONE):
+        assert all(schedule.states[up] in DONE for up in graph[address].upstream)

@@ -20,6 +20,7 @@ class State(StrEnum):
 
 
 DONE = (State.UNCHANGED, State.CACHED, State.RAN)
+_BLOCKING = (State.FAILED, State.SKIPPED, State.INTERRUPTED)  # what depends on such a stage cannot run
 
 
 class Schedule:
@@ -54,9 +55,7 @@ class Schedule:
             return []
         skipped = []
         for each in self.graph:  # in DVC's order, so that what is upstream comes first
-            behind = any(
-                self.states.get(up) in (State.FAILED, State.SKIPPED) for up in self.graph[each].upstream
-            )
+            behind = any(self.states[up] in _BLOCKING for up in self.graph[each].upstream)
             if self._waits(each) and (self._fail_fast or behind):
                 self.states[each] = State.SKIPPED
                 skipped.append(each)
