@@ -20,7 +20,7 @@ from anyview.analysis.statistics import bootstrap_interval
 from anyview.config import Params, load_params
 from anyview.evaluation.runs import explore
 from anyview.learners.trpo import TRPO
-from anyview.pusher.batch import ACTION_SIZE, ACTIONS, OBSERVATION_SIZE, PusherBatch
+from anyview.pusher.batch import ACTION_SIZE, ACTIONS, PusherBatch, observation_size
 from anyview.pusher.contexts import Context, sample_contexts
 from anyview.pusher.episodes import episode
 from anyview.pusher.expert import roll_out
@@ -60,11 +60,16 @@ def shared_context(method: str, episodes: int) -> None:
     copies = params.imitation.trpo.batch_episodes
     contexts, _ = sample_contexts(stream(params.base.seed, "tuning"), RUNS)
     expert, _ = roll_out(contexts)
-    camera = renderer(params.sim.image_size)
+    camera = renderer("push", params.sim.image_size)
     clips = np.stack([camera.render_clip(*each) for each in zip(contexts, expert, strict=True)])
     reward = make_reward(method, params, contexts, clips)
     learner = TRPO(
-        params.imitation.trpo, params.base.seed, range(RUNS), OBSERVATION_SIZE, ACTION_SIZE, ACTIONS
+        params.imitation.trpo,
+        params.base.seed,
+        range(RUNS),
+        observation_size("push", 1),
+        ACTION_SIZE,
+        ACTIONS,
     )
     control, size = params.sim.control, params.sim.image_size
     acting = PusherBatch([context for context in contexts for _ in range(copies)], control, size)

@@ -16,7 +16,8 @@ import numpy as np
 from anyview.pusher.batch import PusherBatch
 from anyview.pusher.contexts import sample_contexts
 from anyview.pusher.render import renderer
-from anyview.pusher.scene import ARENA_CENTRE, CAMERA_DISTANCE, CAMERA_ELEVATION, SUBSTEPS, model
+from anyview.pusher.scene import ARENA_CENTRE, CAMERA_DISTANCE, CAMERA_ELEVATION, SUBSTEPS
+from anyview.pusher.task import load_task
 
 import mujoco  # isort: skip  (after anyview.pusher, which chooses the OpenGL backend)
 
@@ -49,7 +50,7 @@ def main() -> None:
     batch.reset()
     positions = batch.positions()
 
-    scene = copy.copy(model("twist"))
+    scene = copy.copy(load_task("push").model("twist"))
     default = mujoco.MjSpec().visual.quality
     scene.vis.quality.numslices, scene.vis.quality.numstacks = default.numslices, default.numstacks
     scene.vis.quality.numquads = default.numquads
@@ -62,7 +63,7 @@ def main() -> None:
 
     def render_ours() -> int:
         for _ in range(4):
-            renderer(64).render(contexts, positions)
+            renderer("push", 64).render(contexts, positions)
         return 4 * RUNS
 
     def render_plain() -> int:
@@ -80,7 +81,7 @@ def main() -> None:
     rng = np.random.default_rng(1)
     actions = rng.uniform(-1, 1, (STEPS, RUNS, 3))
     torque = PusherBatch(contexts, "torque")
-    torque_model = model("torque")
+    torque_model = load_task("push").model("torque")
     singles = [mujoco.MjData(torque_model) for _ in range(RUNS)]
 
     def step_ours() -> int:

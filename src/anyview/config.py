@@ -56,7 +56,7 @@ class Base(Block):
 
 
 class Sim(Block):
-    """The pusher's world, the same for demonstrations and agents."""
+    """The simulated world, the same for demonstrations and agents."""
 
     image_size: Literal[32, 64, 128] = Field(description="height and width of a frame in pixels")
     control: Literal["twist", "torque"] = Field(
@@ -67,6 +67,9 @@ class Sim(Block):
 class DemonstrationSet(Block):
     """One set of simulated demonstrations."""
 
+    task: str = Field(
+        description="a module of `src/anyview/tasks`, or another that Python can import, with a `TASK`"
+    )
     contexts: Literal["diverse", "narrow", "choice"] = Field(
         description="`diverse`: seen from anywhere, with distractors; `narrow`: from four sides, without; "
         "`choice`: as diverse, with a red goal and a green one, of which a demonstration goes to either"

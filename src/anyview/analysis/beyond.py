@@ -7,26 +7,34 @@ import pandas as pd
 from anyview.analysis.choice import against_choice, choices, choosing
 from anyview.analysis.estimates import Estimator
 from anyview.analysis.metrics import Tree, details
-from anyview.analysis.results import Results, analyse
+from anyview.analysis.results import Results, analyse, outcomes
 from anyview.analysis.study import Study
+from anyview.analysis.tasks import by_task
 
 
 @dataclass(frozen=True)
 class BeyondResults:
-    """``choices`` and ``against_choice``: see ``analysis.choice``; ``others``: all else, as of the thesis."""
+    """``choices`` and ``against_choice``: see ``analysis.choice``; ``tasks``: ``outcomes`` in other tasks.
+
+    ``others``: all else, as of the thesis.
+    """
 
     choices: pd.DataFrame
     against_choice: pd.DataFrame
+    tasks: pd.DataFrame
     others: Results
 
 
 def analyse_beyond(study: Study) -> BeyondResults:
     """Compute every table. ``study`` was read by params ``going_beyond``."""
     estimator = Estimator(study.params.base.seed)
-    alone = {cell: method for cell, method in study.methods.items() if cell not in choosing(study.methods)}
+    elsewhere = {cell: method for methods in by_task(study).values() for cell, method in methods.items()}
+    apart = {*choosing(study.methods), *elsewhere}
+    alone = {cell: method for cell, method in study.methods.items() if cell not in apart}
     return BeyondResults(
         choices(study.methods, estimator),
         against_choice(study.methods, estimator),
+        outcomes(elsewhere, estimator),
         analyse(replace(study, methods=alone)),
     )
 
@@ -38,5 +46,6 @@ def beyond_metrics(results: BeyondResults) -> Tree:
         "translation": results.others.translation,
         "choice": results.choices,
         "clock": results.others.imitation,
+        "tasks": results.tasks,
     }
     return {name: details(table) for name, table in tables.items()}

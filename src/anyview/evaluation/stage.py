@@ -82,7 +82,8 @@ def _imitated(name: str, params: Params) -> list[tuple[Colour | None, list[Conte
     """For each choice, or the only task: the contexts to act in and the clips that are imitated there."""
     kind: Kind = "choice" if two_goals(params) else "diverse"
     rng = stream(params.base.seed, "evaluation" if kind == "diverse" else f"evaluation/{kind}")
-    contexts, _ = sample_contexts(rng, params.imitation.runs, kind)
+    task = params.demonstration_sets[params.imitation.dataset].task
+    contexts, _ = sample_contexts(rng, params.imitation.runs, kind, task)
 
     def clips(choice: Colour | None = None) -> Clips:
         clock = params.methods[name].reward == "clock"

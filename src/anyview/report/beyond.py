@@ -9,11 +9,13 @@ from anyview.analysis.beyond import BeyondResults
 from anyview.analysis.cells import label
 from anyview.analysis.choice import CHOICE, choosing
 from anyview.analysis.study import EvaluatedMethod, SimulatedSet, Study
+from anyview.analysis.tasks import by_task
 from anyview.report.figures import choice
 from anyview.report.figures.style import to_svg
 from anyview.report.formatting import centimetres
 from anyview.report.illustrations import Illustrations, typical_strip
 from anyview.report.pictures import Clip, Strip, make_clip, make_strip
+from anyview.report.tasks import task_rollouts, task_strips
 from anyview.report.text import by_cell, environment
 
 _CONTEXTS = 4
@@ -25,8 +27,9 @@ def illustrate_beyond(study: Study, results: BeyondResults) -> Illustrations:
     strips = {f"translations-{cell}": typical_strip(entry) for cell, entry in study.translators.items()}
     if CHOICE in study.methods and CHOICE in study.simulated:
         strips["two-clips"] = two_clips(study.methods[CHOICE], study.simulated[CHOICE])
-    rollouts = dict(_rollouts(study))
-    return Illustrations(figures, strips, {"rollouts": rollouts} if rollouts else {})
+    strips |= dict(task_strips(study))
+    players = {"rollouts": dict(_rollouts(study)), "task-rollouts": dict(task_rollouts(study))}
+    return Illustrations(figures, strips, {name: clips for name, clips in players.items() if clips})
 
 
 def two_clips(method: EvaluatedMethod, demonstrations: SimulatedSet) -> Strip:
@@ -65,6 +68,8 @@ def write_beyond(
             choices=by_cell(results.choices),
             against_choice=list(results.against_choice.itertuples()),
             imitation=by_cell(results.others.imitation),
+            tasks={task: list(methods) for task, methods in by_task(study).items()},
+            outcomes=by_cell(results.tasks),
             differences=list(results.others.differences.itertuples()),
         )
     )
