@@ -121,7 +121,7 @@ class Context:
             tuple(values["arm_qpos"]),
             distractors,
             choice and Choice(choice["colour"], tuple(choice["other_xy"])),
-            values.get("task", PUSH),
+            str(values.get("task", PUSH)),
         )
 
 

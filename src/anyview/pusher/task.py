@@ -1,7 +1,6 @@
 """What a task is: the plug-in that says what lies on the table, what the arm is to do there, and how it ends.
 
-A task is one module with an instance of ``Task`` named ``TASK``: a module of ``anyview.tasks``, or any module
-that Python can import. Everything else takes a task by the name of its module.
+A task is one module with an instance of ``Task`` named ``TASK``. Everything else takes it by name.
 """
 
 import importlib
@@ -85,19 +84,19 @@ class Task(ABC):
 
 @cache
 def load_task(name: str) -> Task:
-    """The task of ``anyview.tasks.<name>``, or else of the module ``name``; AnyviewError if there is none."""
-    own = f"anyview.tasks.{name}"
-    for module in (own, name):
-        try:
-            found = importlib.util.find_spec(module)
-        except (ImportError, ValueError):
-            found = None
-        if found is not None:
+    """The task of ``anyview.tasks.<name>``, or else of a module of your own, ``anyview_<name>``.
+
+    The prefix keeps files that name a task from importing anything else. AnyviewError if there is no such
+    task.
+    """
+    for module in (f"anyview.tasks.{name}", f"anyview_{name}") if name.isidentifier() else ():
+        if (found := importlib.util.find_spec(module)) is not None:
             task = getattr(importlib.import_module(module), "TASK", None)
             if not isinstance(task, Task):
                 raise AnyviewError(f"task {name}: {found.origin} has no TASK, an instance of Task")
             return task
-    raise AnyviewError(f"task {name}: no such module; there are {', '.join(task_names())}")
+    known = ", ".join(task_names())
+    raise AnyviewError(f"task {name}: no such module; there are {known}, and those of modules anyview_<name>")
 
 
 def task_names() -> list[str]:
