@@ -33,17 +33,17 @@ def test_the_goal_is_where_a_pinhole_camera_sees_it() -> None:
         assert rows.mean() == pytest.approx(row, abs=0.5)
 
 
-def test_one_centimetre_of_object_motion_shows_clearly() -> None:
-    contexts, _ = sample_contexts(np.random.default_rng(2), 8)
+@pytest.mark.parametrize("task", ["push", "strike", "sweep"])
+def test_one_centimetre_of_object_motion_shows_clearly(task: str) -> None:
+    contexts, _ = sample_contexts(np.random.default_rng(2), 8, task=task)
     batch = PusherBatch(contexts)
     batch.reset()
     here = batch.positions()
     for shift in ((0.01, 0), (0, 0.01)):
         there = here.copy()
-        there[:, 3:] += shift
+        there[:, 3:] += np.tile(shift, (here.shape[1] - 3) // 2)
         change = np.abs(
-            renderer("push", 64).render(contexts, there).astype(int)
-            - renderer("push", 64).render(contexts, here)
+            renderer(task, 64).render(contexts, there).astype(int) - renderer(task, 64).render(contexts, here)
         )
         assert ((change.max(-1) > 25).sum((1, 2)) >= 8).all()
 

@@ -38,14 +38,11 @@ def through(poses: Sequence[np.ndarray], steps: Sequence[int]) -> np.ndarray:
 def clearance(fingers: np.ndarray, radius: float, poses: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Least distance (P,) in metres between a tool and discs of ``radius`` along its ``poses`` (P, T, 3).
 
-    ``fingers`` (F, 2, 2) are those of ``scene.fingers``; the k discs lie at ``places`` (P, k, 2), or at
-    (P, k, T, 2) where they move.
+    ``fingers`` (F, 2, 2) are those of ``scene.fingers``; the k discs lie at ``places`` (P, k, 2).
     """
-    if places.ndim == 3:
-        places = places[:, :, None]
     forward = unit_vector(poses[:, None, :, 2])
     left = np.stack([-forward[..., 1], forward[..., 0]], axis=-1)
-    relative = places - poses[:, None, :, :2]
+    relative = places[:, :, None] - poses[:, None, :, :2]
     seen = np.stack([(relative * forward).sum(-1), (relative * left).sum(-1)], axis=-1)  # in the tool's frame
     distance = np.full(seen.shape[:3], np.inf)
     for a, b in fingers:
