@@ -1,8 +1,13 @@
 """`anyview repro` by the real command line: the results of plain `dvc repro`, whatever the number of jobs."""
 
 import json
+import os
+import pty
+import re
 import signal
+import termios
 import time
+from contextlib import suppress
 
 import pytest
 
@@ -128,6 +133,36 @@ def test_each_stage_has_its_part_of_the_cores(fresh, tmp_path):
     assert said == "error: stage a: meta.cores=many: must be a whole number of at least 1\n"
     (toy.folder / "dvc.yaml").write_text(text.replace("cores: 3", "gpus: 99"))
     assert "error: stage a: meta.gpus=99, and this machine has " in toy.run("anyview", "repro", code=2)
+
+
+COUNTING = """
+stages:
+  first: {cmd: "echo 3/4; until [ -e go ]; do sleep 0.05; done; touch first", outs: [first]}
+  second:
+    foreach: [left, right]
+    do: {cmd: "cp first ${item}", deps: [first], outs: ["${item}"]}
+"""
+
+
+def test_on_a_terminal_a_table_shows_what_runs_and_what_waits(fresh, tmp_path):
+    toy = fresh.copy(tmp_path / "toy")
+    (toy.folder / "dvc.yaml").write_text(COUNTING)
+    screen, terminal = pty.openpty()
+    termios.tcsetwinsize(terminal, (20, 70))
+    process = toy.start("anyview", "repro", "--jobs", "2", stdout=terminal, TERM="xterm")
+    os.close(terminal)
+    said = ""
+    while "wait for first" not in said or "75%" not in said:
+        said += os.read(screen, 4096).decode()
+    (toy.folder / "go").touch()
+    assert re.search(r"first +█{12}░{4} +\S+ s +75% .*3/4", said), said
+    assert "second@left, second@right wait for first" in said
+    with suppress(OSError):  # as reading a terminal ends
+        while part := os.read(screen, 4096).decode():
+            said += part
+    assert process.wait() == 0
+    assert "first: ran in " in said
+    assert said.rstrip().endswith("3 ran")
 
 
 SLOW = """
