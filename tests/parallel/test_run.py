@@ -9,6 +9,7 @@ import termios
 import time
 from contextlib import suppress
 
+import psutil
 import pytest
 
 from tests.parallel.toys import DIAMOND, Toy
@@ -120,6 +121,31 @@ def test_an_unchanged_dependency_that_two_share_blocks_none(plain, tmp_path):
     (toy.folder / "go-left").touch()
     said, _ = first.communicate()
     assert "1 ran" in said
+
+
+def test_a_stage_that_is_ended_alone_is_told(plain, tmp_path):
+    """By SIGTERM, as by an administrator, while it waits for another DVC that runs it."""
+    toy = plain.copy(tmp_path / "toy")
+    text = DIAMOND.replace("sleep 0.2", "touch here-${item}; until [ -e go ]; do sleep 0.01; done")
+    (toy.folder / "dvc.yaml").write_text(text)
+    other = toy.start("dvc", "repro", "--single-item", "middle@left")
+    toy.wait_for("here-left", other)
+    process = toy.start("anyview", "repro", "--jobs", "1", "middle@left", "end")
+    log = toy.folder / ".dvc/tmp/parallel/logs/middle@left.log"
+    toy.wait_for(str(log), process)
+    while "waiting" not in log.read_text():
+        time.sleep(0.02)
+    (child,) = psutil.Process(process.pid).children()
+    child.terminate()
+    child.wait()
+    (toy.folder / "go").touch()
+    said, _ = process.communicate(timeout=60)
+    other.communicate()
+    assert process.returncode == 1, said
+    told = "middle@left interrupted: ended by SIGTERM; run the same command again to continue; its log: cat "
+    assert f"{told}'.dvc/tmp/parallel/logs/middle@left.log'" in said
+    assert "skipped: end" in said
+    assert "1 interrupted" in said
 
 
 def test_each_stage_has_its_part_of_the_cores(fresh, tmp_path):

@@ -111,6 +111,7 @@ def test_the_card_says_what_scale_and_how_good(lab: Study, pushed: dict[str, byt
     assert '<video controls loop src="rollout.mp4">' in text
 
 
+@pytest.mark.slow
 def test_a_stranger_pulls_watches_and_exports(lab: Study, pushed, environment, tmp_path):
     other = Study(tmp_path, tmp_path / "scratch")
     (tmp_path / "src").symlink_to(lab.folder / "src")
@@ -139,6 +140,7 @@ def test_a_stranger_pulls_watches_and_exports(lab: Study, pushed, environment, t
     assert "policy-7.safetensors: not in SHA256SUMS" in refused(other, "export-policy", "pusher-ours")
 
 
+@pytest.mark.slow
 def test_what_came_damaged_or_from_elsewhere_is_not_kept(lab: Study, hub: Hub, pushed, environment, tmp_path):
     other = Study(tmp_path, tmp_path / "scratch")
     (tmp_path / "src").symlink_to(lab.folder / "src")
@@ -154,6 +156,7 @@ def test_what_came_damaged_or_from_elsewhere_is_not_kept(lab: Study, hub: Hub, p
     assert [path.name for path in tmp_path.iterdir() if path.name not in ("src", "scratch")] == []
 
 
+@pytest.mark.slow
 def test_a_push_that_cannot_be_is_told(lab: Study, hub: Hub, environment, tmp_path):
     study = lab.copy(tmp_path)
     stranger = environment | {"HF_TOKEN": "hf_wrong"}
