@@ -77,7 +77,7 @@ def headline(moment: Moment) -> str:
     )
     if moment.unmeasured:
         least = f"at least {clock(moment.left)} and " if moment.left else ""
-        return f"{text}; left: {least}{moment.unmeasured} stages that were never measured"
+        return f"{text}; left: {least}{moment.unmeasured} stages never measured"
     return f"{text}; {clock(moment.left)} left by the critical path"
 
 
