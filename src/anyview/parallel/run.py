@@ -85,9 +85,13 @@ def run(
                     Path(orders[address].log).unlink(missing_ok=True)
                     engine.start(graph[address], orders[address])
                     schedule.start(address)
+            ended = engine.wait(_TICK_SECONDS)
+            for address in schedule.of(State.RUNNING):
+                # A cluster keeps a stage until a node has room; then it begins its log.
+                if address not in since and Path(orders[address].log).exists():
                     since[address] = time.monotonic()
                     view.started(address)
-            for result in engine.wait(_TICK_SECONDS):
+            for result in ended:
                 results[result.address] = result
                 view.ended(result, schedule.finish(result.address, result.state))
                 if result.state is State.RAN:
@@ -111,12 +115,13 @@ def _moment(
 ) -> Moment:
     now = time.monotonic()
     running = {}
-    for address in schedule.of(State.RUNNING):
+    under_way = schedule.of(State.RUNNING)
+    for address in (each for each in under_way if each in since):
         elapsed = now - since[address]
         running[address] = (elapsed, read_progress(Path(orders[address].log), elapsed, seconds.get(address)))
     left = {address: progress.left or 0.0 for address, (_, progress) in running.items()}
     over = [a for a, state in schedule.states.items() if state not in (State.RUNNING, State.WAITING)]
-    waiting = schedule.of(State.WAITING)
+    waiting = [each for each in under_way if each not in since] + schedule.of(State.WAITING)
     unmeasured = [a for a in waiting if a not in seconds] + [
         a for a, (_, progress) in running.items() if progress.left is None
     ]

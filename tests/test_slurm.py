@@ -68,8 +68,10 @@ def test_the_recipe_runs_stages_on_both_nodes(root: Path, tmp_path):
         "SLURM_JOB_NUM_NODES": "2",
         "SLURM_CPUS_PER_TASK": "1",
         "PATH": f"{commands}:{os.environ['PATH']}",
+        "RAY_gcs_rpc_server_reconnect_timeout_s": "5",  # how long the second node outlives the first
     }
-    said = toy.run("bash", "job.sh", **slurm)
+    process = toy.start("bash", "job.sh", **slurm)
+    said, _ = process.communicate(timeout=400)
     assert "5 ran" in said
     assert {toy.read("node-left"), toy.read("node-right")} == {"10.77.0.1 \n", "10.77.0.2 \n"}
     assert "Data and pipelines are up to date." in toy.run("dvc", "repro")
