@@ -94,7 +94,7 @@ def test_what_is_pushed(lab: Study, pushed: dict[str, bytes]):
     kinds = {Path(name).suffix for name in pushed}
     assert kinds == {".safetensors", ".json", ".csv", ".md", ".yaml", ".mp4", ""}
     provenance = YAML(typ="safe").load(pushed["provenance.yaml"])
-    assert set(provenance) == {"imitate@ours", "train@sim"}
+    assert set(provenance) == {"imitate@ours", "train@sim", "split@diverse", "simulate@diverse"}
 
 
 def test_the_card_says_what_scale_and_how_good(lab: Study, pushed: dict[str, bytes]):
@@ -107,6 +107,7 @@ def test_the_card_says_what_scale_and_how_good(lab: Study, pushed: dict[str, byt
     distances = [float(row[runs[0].index("final_distance")]) for row in runs[1:]]
     assert metrics["median final distance, cm"] == pytest.approx(100 * np.median(distances), abs=1e-3)
     assert "| `imitation.runs` | 2 |" in text
+    assert "| `simulate.sets.diverse.demos` | 24 |" in text
     assert f"anyview pull {REPO}" in text
     assert '<video controls loop src="rollout.mp4">' in text
 

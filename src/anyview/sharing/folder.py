@@ -3,7 +3,7 @@
 - ``policies/``: ``policy-<run>.safetensors``, ``policy.json``, ``runs.csv``, ``curve.csv``;
 - ``model/``: the translator or embedding of the method's reward, if it has one;
 - ``rollout.mp4``: the run of median final distance, seen by its own camera;
-- ``provenance.yaml``: the entries of dvc.lock that made policies and model;
+- ``provenance.yaml``: the entries of dvc.lock that made policies, model and their data;
 - ``SHA256SUMS``: checksums of all of these, for ``sha256sum -c`` too;
 - ``README.md``: the card, without a checksum, because cards are edited where they are shown.
 
@@ -66,11 +66,8 @@ def make_folder(folder: Path, method: str, run: int) -> Lock:
 
 
 def _provenance(policies: Path) -> Lock:
-    """The entries of dvc.lock that made ``policies`` and the model of their reward."""
-    lock = read_lock(Revision(Path()))
-    entries = _makers(lock, policies)
-    for model in _models(entries):
-        entries |= _makers(lock, model)
+    """The entries of dvc.lock that made ``policies`` and all that these learned from."""
+    entries = _makers(read_lock(Revision(Path())), policies)
     for folder in (policies, *_models(entries)):
         stated = {each["md5"] for entry in entries.values() for each in _paths(entry) if _is(each, folder)}
         if stated != {dvc_hash(folder)}:
@@ -81,11 +78,14 @@ def _provenance(policies: Path) -> Lock:
 
 
 def _makers(lock: Lock, output: Path) -> Lock:
-    return {
-        stage: entry
-        for stage, entry in lock.items()
-        if any(_is(out, output) for out in entry.get("outs", []))
-    }
+    """Of ``lock``, the stage that made ``output`` and those before it."""
+    found: Lock = {}
+    for stage, entry in lock.items():
+        if any(_is(out, output) for out in entry.get("outs", [])):
+            found[stage] = entry
+            for dep in entry.get("deps", []):
+                found |= _makers(lock, Path(dep["path"]))
+    return found
 
 
 def _models(lock: Lock) -> list[Path]:
