@@ -13,7 +13,7 @@ import pytest
 from anyview.analysis.study import EvaluatedMethod
 from anyview.config import Params, load_params
 from anyview.video.files import write_video
-from anyview.video.sets import write_shard
+from anyview.video.sets import write_set, write_shard
 
 ROOT = Path(__file__).parents[1]
 RUNS = 15
@@ -53,11 +53,11 @@ class Data:
         clips = [f"{kind}-{index:04d}" for index in range(count)]
         shards = np.arange(count) // 20
         rows = {"clip": clips, "shard": shards, "position": np.arange(count) % 20}
-        self._csv(folder / "manifest.csv", **rows, success=[index != 3 for index in range(count)])
         stored = [
             write_shard(folder, shard, np.stack([clip(50, n, 2) for n in range(20)])) for shard in set(shards)
         ]
-        self._csv(folder / "files.csv", file=[each.file for each in stored], frames=[50] * len(stored))
+        rows["success"] = [index != 3 for index in range(count)]
+        write_set(folder, pd.DataFrame(rows), stored)
         self._json(folder / "summary.json", demos=count, expert_success=0.975, acceptance=0.4)
 
     def real_clips(self) -> None:
