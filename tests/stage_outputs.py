@@ -175,18 +175,18 @@ def whole_study(root: Path) -> None:
         data.policies(cell, distances.get(cell, 0.03 + 0.01 * index), returns=not learned, blind=learned)
 
 
-def run_report(root: Path) -> subprocess.CompletedProcess:
+def run_report(root: Path, *arguments: str) -> subprocess.CompletedProcess:
     """Run the report stage in ``root`` as DVC would, with the repository's own params and pipeline."""
     (root / "stages").mkdir(exist_ok=True)
-    for name in ("params.yaml", "dvc.yaml"):
-        shutil.copy(ROOT / name, root / name)
-    command = [sys.executable, ROOT / "stages/report.py"]
+    shutil.copy(ROOT / "params.yaml", root)
+    shutil.copy(ROOT.joinpath(*arguments, "dvc.yaml"), root)
+    command = [sys.executable, ROOT / "stages/report.py", *arguments]
     return subprocess.run(command, cwd=root, capture_output=True, text=True)
 
 
 @pytest.fixture(scope="session")
 def report():
-    """``report(root)`` runs the stage in ``root``."""
+    """``report(root)`` runs the stage in ``root``, ``report(root, "beyond")`` that of beyond/."""
     return run_report
 
 

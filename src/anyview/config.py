@@ -280,7 +280,7 @@ class Incomplete(Block):
     """Clips that lack frames. The reward is given only at the steps of which there is a frame."""
 
     every: Annotated[int, Field(ge=1, le=49)] = Field(
-        default=1, description="every how manieth frame is there, from the first on"
+        default=1, description="n where every n-th frame is there, from the first on"
     )
     until: Annotated[float, Field(gt=0, le=1)] = Field(
         default=1.0, description="the part of the clip, from its start, after which there is none"
@@ -304,7 +304,10 @@ class DemonstrationCell(Block):
     model: str = Field(description="the translator: a cell of `translators`")
     weights: RewardWeights
     time_power: NonNegative = Field(description="reward at step t is weighted by (t/49) to this power")
-    incomplete: Incomplete = Field(default=Incomplete(), description="which frames of the clips there are")
+    incomplete: Incomplete = Field(
+        default=Incomplete(),
+        description="which frames there are: every n-th (`every`), up to a part of the clip (`until`)",
+    )
 
 
 class EmbeddingRewardCell(Block):
