@@ -117,7 +117,10 @@ def read_stored(folder: Path, clip: str) -> tuple[np.ndarray, float]:
             _check(folder, stored)
             with open_video(folder / stored.file) as video:
                 wanted = islice(video.frames(), place * stored.frames, (place + 1) * stored.frames)
-                return np.stack([video.rgb(frame) for frame in wanted]), video.rate
+                frames = [video.rgb(frame) for frame in wanted]
+            if len(frames) < stored.frames:
+                raise AnyviewError(f"{folder / stored.file}: fewer frames than files.csv says")
+            return np.stack(frames), video.rate
         place -= stored.clips
     raise AnyviewError(f"{folder / 'manifest.csv'}: it lists more clips than files.csv")
 
