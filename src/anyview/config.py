@@ -369,6 +369,12 @@ class BeyondCell(DemonstrationCell):
         default="evaluation", description="the random stream that the contexts are drawn from"
     )
 
+    @model_validator(mode="after")
+    def _clips_to_own(self) -> "BeyondCell":
+        if self.own_clips and self.reward == "clock":
+            raise ValueError("own_clips: a clock hears of no clip")
+        return self
+
 
 class Beyond(Block):
     """What goes beyond the thesis, by the pipeline beyond/dvc.yaml: sets and cells as in the blocks above."""
