@@ -14,8 +14,8 @@ _CONTRAST = 0.35  # that an object has with the table, at least
 
 
 def sample_object(rng: np.random.Generator, table: Colour) -> list[Shape]:
-    """The object in its own frame: most often round, and blue every second time."""
-    tone = looks.blue(rng) if rng.random() < 0.5 else looks.colour(rng)
+    """The object in its own frame: most often round and blue."""
+    tone = looks.blue(rng) if rng.random() < 0.8 else looks.colour(rng)
     while looks.contrast(tone, table) < _CONTRAST:
         tone = looks.colour(rng)
     look = looks.surface(rng, tone)
@@ -35,8 +35,8 @@ def sample_object(rng: np.random.Generator, table: Colour) -> list[Shape]:
 
 
 def sample_target(rng: np.random.Generator, push: Push, table: Colour, object_tone: Colour) -> list[Shape]:
-    """The flat target in its place: most often square, and red two times of five."""
-    tone = looks.red(rng) if rng.random() < 0.4 else looks.colour(rng)
+    """The flat target in its place: most often square, and red three times of five."""
+    tone = looks.red(rng) if rng.random() < 0.6 else looks.colour(rng)
     while min(looks.contrast(tone, table), looks.contrast(tone, object_tone)) < _CONTRAST:
         tone = looks.colour(rng)
     look = Surface(tone, specular=0.1 * rng.random(), casts_shadow=False)
@@ -56,16 +56,19 @@ def sample_target(rng: np.random.Generator, push: Push, table: Colour, object_to
     return moved(shapes, (*push.target_xy, 0.001), yaw(push.target_yaw))
 
 
-def sample_things(rng: np.random.Generator, push: Push) -> list[Shape]:
-    """Other things on the table, none to two dozen of them, out of the way of the push."""
+def sample_things(rng: np.random.Generator, push: Push, object_tone: Colour) -> list[Shape]:
+    """Other things on the table, none to two dozen of them, out of the way of the push.
+
+    Beside a blue object none of them is blue: nothing else would tell which one will be pushed.
+    """
     most = rng.choice([2, 8, 25], p=[0.35, 0.35, 0.30])
     count = int(rng.integers(0, most + 1))
     swept = np.concatenate([push.cup[::20, :2], push.object_xy[::20]])
     discs = [(*push.target_xy, TARGET_HALF * 1.6)]
-    palette = [looks.colour(rng) for _ in range(int(rng.integers(1, 9)))]
+    palette = [_other_colour(rng, object_tone) for _ in range(int(rng.integers(1, 9)))]
     shapes: list[Shape] = []
     for _ in range(count):
-        tone = palette[rng.integers(len(palette))] if rng.random() < 0.6 else looks.colour(rng)
+        tone = palette[rng.integers(len(palette))] if rng.random() < 0.6 else _other_colour(rng, object_tone)
         thing, radius = _THINGS[rng.integers(len(_THINGS))](rng, looks.surface(rng, tone))
         for _ in range(12):
             x, y = rng.uniform(-0.46, 0.46), rng.uniform(-0.28, 0.40)
@@ -75,6 +78,13 @@ def sample_things(rng: np.random.Generator, push: Push) -> list[Shape]:
                 shapes += moved(thing, (x, y, 0), yaw(rng.uniform(0, 2 * np.pi)))
                 break
     return shapes
+
+
+def _other_colour(rng: np.random.Generator, object_tone: Colour) -> Colour:
+    tone = looks.colour(rng)
+    while looks.is_blue(object_tone) and looks.is_blue(tone):
+        tone = looks.colour(rng)
+    return tone
 
 
 def _block(rng: np.random.Generator, look: Surface) -> tuple[list[Shape], float]:
