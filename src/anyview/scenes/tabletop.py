@@ -10,6 +10,8 @@ from anyview.scenes.shapes import Colour, Shape, Surface, box, capsule, cylinder
 from anyview.surrogate.push import OBJECT_RADIUS, TARGET_HALF, Push
 from anyview.trigonometry import unit_vector
 
+Paint = Callable[[np.random.Generator], Colour]
+
 _CONTRAST = 0.35  # that an object has with the table, at least
 
 
@@ -65,11 +67,12 @@ def sample_things(rng: np.random.Generator, push: Push, object_tone: Colour) -> 
     count = int(rng.integers(0, most + 1))
     swept = np.concatenate([push.cup[::20, :2], push.object_xy[::20]])
     discs = [(*push.target_xy, TARGET_HALF * 1.6)]
-    palette = [_other_colour(rng, object_tone) for _ in range(int(rng.integers(1, 9)))]
+    paint = _no_blue if looks.is_blue(object_tone) else looks.colour
+    palette = [paint(rng) for _ in range(int(rng.integers(1, 9)))]
     shapes: list[Shape] = []
     for _ in range(count):
-        tone = palette[rng.integers(len(palette))] if rng.random() < 0.6 else _other_colour(rng, object_tone)
-        thing, radius = _THINGS[rng.integers(len(_THINGS))](rng, looks.surface(rng, tone))
+        tone = palette[rng.integers(len(palette))] if rng.random() < 0.6 else paint(rng)
+        thing, radius = _THINGS[rng.integers(len(_THINGS))](rng, looks.surface(rng, tone), paint)
         for _ in range(12):
             x, y = rng.uniform(-0.46, 0.46), rng.uniform(-0.28, 0.40)
             clear = np.hypot(*(swept - (x, y)).T).min() > radius + 0.065
@@ -80,49 +83,49 @@ def sample_things(rng: np.random.Generator, push: Push, object_tone: Colour) -> 
     return shapes
 
 
-def _other_colour(rng: np.random.Generator, object_tone: Colour) -> Colour:
+def _no_blue(rng: np.random.Generator) -> Colour:
     tone = looks.colour(rng)
-    while looks.is_blue(object_tone) and looks.is_blue(tone):
+    while looks.is_blue(tone):
         tone = looks.colour(rng)
     return tone
 
 
-def _block(rng: np.random.Generator, look: Surface) -> tuple[list[Shape], float]:
+def _block(rng: np.random.Generator, look: Surface, paint: Paint) -> tuple[list[Shape], float]:
     x, y, z = rng.uniform(0.015, 0.06), rng.uniform(0.015, 0.05), rng.uniform(0.008, 0.05)
     shapes = [box((x, y, z), (0, 0, z), look)]
     if rng.random() < 0.4:
-        lid = looks.surface(rng, looks.colour(rng), casts_shadow=False)
+        lid = looks.surface(rng, paint(rng), casts_shadow=False)
         shapes.append(box((x * 0.9, y * 0.9, 0.003), (0, 0, 2 * z), lid))
     return shapes, math.hypot(x, y)
 
 
-def _can(rng: np.random.Generator, look: Surface) -> tuple[list[Shape], float]:
+def _can(rng: np.random.Generator, look: Surface, paint: Paint) -> tuple[list[Shape], float]:
     radius, half = rng.uniform(0.018, 0.05), rng.uniform(0.01, 0.065)
     shapes = [cylinder(radius, half, (0, 0, half), look)]
     if rng.random() < 0.6:
-        inside = Surface(looks.colour(rng), casts_shadow=False)
+        inside = Surface(paint(rng), casts_shadow=False)
         shapes.append(cylinder(radius * rng.uniform(0.3, 0.9), 0.001, (0, 0, 2 * half), inside))
     if rng.random() < 0.3:
         shapes.append(capsule((radius, 0, half * 0.6), (radius + 0.015, 0, half * 1.4), 0.006, look))
     return shapes, radius + 0.01
 
 
-def _ball(rng: np.random.Generator, look: Surface) -> tuple[list[Shape], float]:
+def _ball(rng: np.random.Generator, look: Surface, paint: Paint) -> tuple[list[Shape], float]:
     radius, flat = rng.uniform(0.015, 0.04), rng.uniform(0.5, 1.0)
     long = radius * rng.choice([1.0, rng.uniform(1.0, 1.7)])
     return [ellipsoid((long, radius, radius * flat), (0, 0, radius * flat), look)], long
 
 
-def _stick(rng: np.random.Generator, look: Surface) -> tuple[list[Shape], float]:
+def _stick(rng: np.random.Generator, look: Surface, paint: Paint) -> tuple[list[Shape], float]:
     half, radius = rng.uniform(0.03, 0.10), rng.uniform(0.003, 0.008)
     shapes = [capsule((-half, 0, radius), (half, 0, radius), radius, look)]
     if rng.random() < 0.4:
-        tip = looks.surface(rng, looks.colour(rng), casts_shadow=False)
+        tip = looks.surface(rng, paint(rng), casts_shadow=False)
         shapes.append(capsule((half * 0.5, 0, radius), (half, 0, radius), radius * 1.2, tip))
     return shapes, half
 
 
-def _sheet(rng: np.random.Generator, look: Surface) -> tuple[list[Shape], float]:
+def _sheet(rng: np.random.Generator, look: Surface, paint: Paint) -> tuple[list[Shape], float]:
     x, y, z = (
         rng.uniform(0.025, 0.11),
         rng.uniform(0.025, 0.08),
@@ -130,32 +133,32 @@ def _sheet(rng: np.random.Generator, look: Surface) -> tuple[list[Shape], float]
     )
     shapes = [box((x, y, z), (0, 0, z), look)]
     if rng.random() < 0.5:
-        printed = Surface(looks.colour(rng), casts_shadow=False)
+        printed = Surface(paint(rng), casts_shadow=False)
         shapes.append(
             box((x * rng.uniform(0.4, 0.95), y * rng.uniform(0.4, 0.95), 0.0006), (0, 0, 2 * z), printed)
         )
     return shapes, math.hypot(x, y)
 
 
-def _bottle(rng: np.random.Generator, look: Surface) -> tuple[list[Shape], float]:
+def _bottle(rng: np.random.Generator, look: Surface, paint: Paint) -> tuple[list[Shape], float]:
     radius, half = rng.uniform(0.018, 0.036), rng.uniform(0.03, 0.075)
-    neck = looks.surface(rng, looks.colour(rng))
+    neck = looks.surface(rng, paint(rng))
     return [
         cylinder(radius, half, (0, 0, half), look),
         cylinder(radius * rng.uniform(0.3, 0.6), half * 0.3, (0, 0, 2.3 * half), neck),
     ], radius
 
 
-def _plate(rng: np.random.Generator, look: Surface) -> tuple[list[Shape], float]:
+def _plate(rng: np.random.Generator, look: Surface, paint: Paint) -> tuple[list[Shape], float]:
     radius, half = rng.uniform(0.04, 0.09), rng.uniform(0.002, 0.012)
-    middle = looks.surface(rng, looks.colour(rng), casts_shadow=False)
+    middle = looks.surface(rng, paint(rng), casts_shadow=False)
     return [
         cylinder(radius, half, (0, 0, half), look),
         cylinder(radius * rng.uniform(0.3, 0.9), 0.001, (0, 0, 2 * half), middle),
     ], radius
 
 
-_THINGS: tuple[Callable[[np.random.Generator, Surface], tuple[list[Shape], float]], ...] = (
+_THINGS: tuple[Callable[[np.random.Generator, Surface, Paint], tuple[list[Shape], float]], ...] = (
     _block,
     _block,
     _can,

@@ -11,7 +11,7 @@ from anyview.config import Training, TranslatorCell
 from anyview.runtime.device import products_in
 from anyview.runtime.errors import AnyviewError
 from anyview.seeds import stream, torch_seed
-from anyview.training.augmentation import Augmentation
+from anyview.training.augmentation import Augmentation, mirror
 from anyview.training.common.batches import FramePairs, training_pairs, training_views, validation_pairs
 from anyview.training.common.optimization import MakeOptimizer
 from anyview.translator.architectures import Translator, make_translator
@@ -81,7 +81,7 @@ class TranslatorObjective:
         marks = self._marks(dataset, pairs, device)
         if self.cell.mirror:
             rng = stream(self.seed, "translator/mirror", iteration, part)
-            paired, context, clip, marks = _mirror(paired, context, clip, marks, rng)
+            paired, context, clip, marks = mirror(paired, context, clip, marks, rng)
         if augmentation := self._augmentations.get(dataset.name):
             rng = stream(self.seed, "translator/augmentation", iteration, part)
             expert, target = paired.chunk(2)
@@ -147,26 +147,3 @@ class TranslatorObjective:
             (2 * torch.from_numpy(pixels).to(device) + 1) / dataset.image_size - 1 for pixels in found
         ]
         return Marks(*in_units)
-
-
-def _mirror(
-    paired: Tensor, context: Tensor, clip: Tensor | None, marks: Marks | None, rng: np.random.Generator
-) -> tuple[Tensor, Tensor, Tensor | None, Marks | None]:
-    """Half of the experts' clips and half of the contexts mirrored, with their marks."""
-    experts, contexts = (
-        torch.from_numpy(rng.random(len(context)) < 0.5).to(context.device) for _ in range(2)
-    )
-
-    def flip(frames: Tensor, which: Tensor) -> Tensor:
-        return torch.where(which.view(-1, *[1] * (frames.ndim - 1)), frames.flip(-1), frames)
-
-    def reflect(places: Tensor, which: Tensor) -> Tensor:
-        return torch.where(which[:, None, None], places * places.new_tensor((-1.0, 1.0)), places)
-
-    both = torch.cat((experts, contexts))
-    return (
-        flip(paired, both),
-        flip(context, contexts),
-        None if clip is None else flip(clip, experts),
-        None if marks is None else Marks(reflect(marks.paired, both), reflect(marks.context, contexts)),
-    )

@@ -97,8 +97,8 @@ def batch_losses(
 
     Frames are in [-1, 1]. ``clip`` (N, K, 3, H, W) are ``task_frames`` of the expert's clips, if T is given a
     task embedding. With ``wanted`` only the losses whose weight is above 0 are computed; ``noise``
-    turns dropout on. With ``marks`` there is L_places, of a translator of keypoints. What the decoder makes of
-    the skips is computed once for both decodings.
+    turns dropout on. With ``marks`` there is L_places, of a translator of keypoints. What the decoder makes
+    of the skips is computed once for both decodings.
     """
     target = paired[len(context) :]
     z1, z_true = model.encode_expert(paired, noise).chunk(2)

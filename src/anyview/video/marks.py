@@ -28,7 +28,7 @@ def read_marks(folder: Path, clips: int, length: int) -> np.ndarray | None:
     for path in marks_file(folder):
         try:
             marks = np.load(path, allow_pickle=False)
-        except (OSError, ValueError):
+        except (OSError, ValueError, EOFError):
             raise AnyviewError(f"{path}: damaged; run `dvc checkout --force`") from None
         if marks.dtype != np.float32 or marks.shape != (clips, length, *marks.shape[2:3], 2):
             raise AnyviewError(
