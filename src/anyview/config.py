@@ -493,7 +493,7 @@ def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
 
 
 def _refuse_pretraining_alone(params: Params, name: str) -> None:
-    """Refuse a translator that would never see clips of its own."""
+    """Refuse a translator that would never see clips of its own, or whose other clips nobody would open."""
     blocks = {"translators": params.translators, "beyond.translators": params.beyond.translators}
     for block, cells in blocks.items():
         for key, cell in cells.items():
@@ -503,6 +503,11 @@ def _refuse_pretraining_alone(params: Params, name: str) -> None:
                     f"{name}: {block}.{key}.pretraining.iterations: {before} must be below "
                     f"{block}.{key}.iterations, {all_of_them}, which counts them"
                 )
+    for key in params.evidence.translators:
+        if params.translators[key].pretraining.iterations:
+            raise AnyviewError(
+                f"{name}: evidence.translators: {key} pretrains, and those of the evidence do not"
+            )
 
 
 def _refuse_twins(params: Params, name: str) -> None:
