@@ -66,7 +66,7 @@ class KeypointEncoder(nn.Module):
         x = x + self.everywhere(pooled)[:, :, None, None]
         for skip, lateral, up, smooth in zip((middle, fine), self.lateral, self.up, self.smooth, strict=True):
             x = smooth(activate(F.interpolate(up(x), scale_factor=2.0) + lateral(skip)))
-        heat = self.heat(x).flatten(2).softmax(-1)
+        heat = self.heat(x).flatten(2).float().softmax(-1)  # places need more digits than bfloat16 has
         where = heat.unflatten(2, x.shape[2:])
         axis = _axis(x)
         places = torch.stack(((where.sum(2) * axis).sum(-1), (where.sum(3) * axis).sum(-1)), -1)
