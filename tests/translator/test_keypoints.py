@@ -56,7 +56,7 @@ def test_at_first_the_context_is_copied_more_than_painted_over(model):
 
 
 @settings(max_examples=15, deadline=None)
-@given(hnp.arrays(np.float32, (1, KEYPOINTS, 2), elements=st.floats(-1.2, 1.2, width=32)))
+@given(hnp.arrays(np.float32, (1, KEYPOINTS, 2), elements=st.floats(-1.25, 1.25, width=32)))
 def test_strokes_are_gaussians_around_places_and_lines(places):
     """Against the distance of each pixel's centre from a point, or from a dense row of points."""
     made = _strokes(torch.from_numpy(places), torch.zeros(1, 1, 12, 12))[0].numpy()
