@@ -184,6 +184,11 @@ def test_the_committed_params_are_sound():
             "evidence.translators: 'tcn' is none of these: real-adam, ",
         ),
         ("evidence.seeds", [1, 2, 1], "evidence: a translator or a seed is listed twice"),
+        (
+            "evidence.translators",
+            ["sim", "real-pretrained"],
+            "evidence.translators: real-pretrained pretrains, and those of the evidence do not",
+        ),
         ("real.ingest.frames", 10**6, "real.ingest.frames: Input should be less than or equal to 10000"),
     ],
 )

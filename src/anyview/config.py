@@ -146,6 +146,10 @@ class LossWeights(Block):
     translation: NonNegative
     reconstruction: NonNegative
     alignment: NonNegative
+    places: NonNegative = Field(
+        default=0.0,
+        description="of keypoints away from marks: for the architecture `keypoint`, on clips with marks",
+    )
 
     @model_validator(mode="after")
     def _some_loss(self) -> "LossWeights":
@@ -165,7 +169,7 @@ class TranslatorCell(Block):
     """Stage `train`: one context translator."""
 
     dataset: str = Field(description="set of clips to learn from")
-    architecture: Literal["real", "sim", "compact"]
+    architecture: Literal["real", "sim", "compact", "keypoint"]
     optimizer: Literal["adam", "adadelta"]
     iterations: Count
     weights: LossWeights
@@ -174,6 +178,7 @@ class TranslatorCell(Block):
     )
     pretraining: Pretraining
     augment: bool = Field(description="augment the contexts during training")
+    mirror: bool = Field(default=False, description="mirror half of the clips during training")
     task_embedding: bool = Field(
         default=False,
         description="give T the mean of Enc1 over 8 frames of the expert's clip; not in the thesis",
@@ -521,7 +526,7 @@ def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
 
 
 def _refuse_pretraining_alone(params: Params, name: str) -> None:
-    """Refuse a translator that would never see clips of its own."""
+    """Refuse a translator that would never see clips of its own, or whose other clips nobody would open."""
     blocks = {"translators": params.translators, "beyond.translators": params.beyond.translators}
     for block, cells in blocks.items():
         for key, cell in cells.items():
@@ -531,6 +536,11 @@ def _refuse_pretraining_alone(params: Params, name: str) -> None:
                     f"{name}: {block}.{key}.pretraining.iterations: {before} must be below "
                     f"{block}.{key}.iterations, {all_of_them}, which counts them"
                 )
+    for key in params.evidence.translators:
+        if params.translators[key].pretraining.iterations:
+            raise AnyviewError(
+                f"{name}: evidence.translators: {key} pretrains, and those of the evidence do not"
+            )
 
 
 def _refuse_twins(params: Params, name: str) -> None:

@@ -20,10 +20,10 @@ from anyview.rewards.demonstration import (
 from anyview.rewards.embedding import EmbeddingReward
 from anyview.runtime.device import torch_device
 from anyview.runtime.errors import AnyviewError
-from anyview.translator.network import ContextTranslator
+from anyview.translator.architectures import Translator
 from anyview.translator.weights import load_translator
 
-Model = TypeVar("Model", ContextTranslator, Embedding)
+Model = TypeVar("Model", Translator, Embedding)
 
 
 def make_reward(group: Group) -> Scoring:

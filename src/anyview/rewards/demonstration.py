@@ -13,7 +13,7 @@ from torch import Tensor
 
 from anyview.config import Incomplete, RewardWeights
 from anyview.learners.common.interfaces import Arrays
-from anyview.translator.network import ContextTranslator
+from anyview.translator.architectures import Translator
 from anyview.video.pixels import to_frames, to_input
 
 _BATCH = 64
@@ -35,7 +35,7 @@ class DemonstrationReward:
 
     def __init__(
         self,
-        model: ContextTranslator,
+        model: Translator,
         features: Tensor,
         images: Tensor,
         first_frames: np.ndarray,
@@ -112,7 +112,7 @@ def hold(clips: np.ndarray, there: np.ndarray) -> np.ndarray:
 
 @torch.inference_mode()
 def translate_demonstrations(
-    model: ContextTranslator, demonstrations: np.ndarray, first_frames: np.ndarray
+    model: Translator, demonstrations: np.ndarray, first_frames: np.ndarray
 ) -> tuple[Tensor, Tensor]:
     """Mean translated features (R, T, Z) and frames (R, T, 3, H, W) for each agent's first frame.
 
@@ -130,9 +130,7 @@ def translate_demonstrations(
 
 
 @torch.inference_mode()
-def translate_clock(
-    model: ContextTranslator, clips: np.ndarray, first_frames: np.ndarray
-) -> tuple[Tensor, Tensor]:
+def translate_clock(model: Translator, clips: np.ndarray, first_frames: np.ndarray) -> tuple[Tensor, Tensor]:
     """What the translator makes of the mean of Enc1 over ``clips``, which tells it nothing but the time step.
 
     Shapes as of ``translate_demonstrations``.
@@ -143,7 +141,7 @@ def translate_clock(
 
 
 def _translate(
-    model: ContextTranslator, clips: Sequence[Tensor], first_frames: np.ndarray, device: torch.device
+    model: Translator, clips: Sequence[Tensor], first_frames: np.ndarray, device: torch.device
 ) -> tuple[Tensor, Tensor]:
     """The means over ``clips``, each z1 (T, Z), of their translated features and frames."""
     features, images = [], []
@@ -156,16 +154,14 @@ def _translate(
 
 
 @torch.inference_mode()
-def true_demonstrations(model: ContextTranslator, clips: np.ndarray) -> tuple[Tensor, Tensor]:
+def true_demonstrations(model: Translator, clips: np.ndarray) -> tuple[Tensor, Tensor]:
     """The Oracle's targets: Enc1(o_t) and o_t of ``clips`` (R, T + 1, H, W, 3), each in its agent's view."""
     device = next(model.parameters()).device
     features = torch.stack([_encode(model, clip[1:], device) for clip in clips])
     return features, to_input(torch.from_numpy(clips[:, 1:]).to(device))
 
 
-def _encode(
-    model: ContextTranslator, frames: Sequence[np.ndarray] | np.ndarray, device: torch.device
-) -> Tensor:
+def _encode(model: Translator, frames: Sequence[np.ndarray] | np.ndarray, device: torch.device) -> Tensor:
     """Enc1 (N, Z) of uint8 frames (N, H, W, 3), a bounded batch at a time."""
     pixels = torch.from_numpy(np.ascontiguousarray(frames)).to(device)
     return torch.cat([model.encode_expert(to_input(part)) for part in pixels.split(_BATCH)])
