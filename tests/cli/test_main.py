@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-COMMANDS = ["repro", "doctor", "profile", "record", "clips", "export", "translate", "watch"]
-COMMANDS += ["export-policy", "push", "pull", "review", "sweep", "clean"]
+COMMANDS = ["repro", "doctor", "profile", "record", "clips", "export", "translate", "imitate"]
+COMMANDS += ["watch", "export-policy", "push", "pull", "review", "sweep", "clean"]
 
 
 @pytest.fixture

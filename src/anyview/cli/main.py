@@ -14,6 +14,7 @@ from rich.console import Console
 from anyview.cli.clips import clips
 from anyview.cli.export import export
 from anyview.cli.export_policy import export_policy
+from anyview.cli.imitate import imitate
 from anyview.cli.record import record
 from anyview.cli.repro import repro
 from anyview.cli.review import review, sweep
@@ -140,6 +141,7 @@ for command in (
     clips,
     export,
     translate,
+    imitate,
     watch,
     export_policy,
     push,
