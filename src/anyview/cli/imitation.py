@@ -21,6 +21,7 @@ from anyview.rewards.cells import make_reward
 from anyview.runtime.errors import AnyviewError
 from anyview.runtime.outputs import whole_folder, write_atomically
 from anyview.runtime.scratch import checkpoint_folder
+from anyview.sharing.checksums import find_model
 from anyview.translator.weights import read_meta
 from anyview.video.files import write_video
 
@@ -63,7 +64,7 @@ class Outcome:
 
 
 def prepare(
-    clip: str, model: Path | None, context: int | None, seed: int, episodes: int, output: Path
+    clip: str, model: str | None, context: int | None, seed: int, episodes: int, output: Path
 ) -> Task:
     """Check everything before the work starts. Raises AnyviewError if anything of it does not fit."""
     study = load_params()
@@ -75,7 +76,7 @@ def prepare(
     if model is None:
         folder = _fitting_model(study, stored.dataset if stored else study.imitation.dataset)
     else:
-        folder = model if model.is_dir() else paths.model(str(model))
+        folder = find_model(model)
     meta = read_meta(folder)
     if (dataset := meta.get("dataset")) not in study.demonstration_sets:
         sets = ", ".join(study.demonstration_sets)
@@ -146,7 +147,7 @@ def _fitting_model(params: Params, dataset: str) -> Path:
 
 
 def _has_every_loss(weights: LossWeights) -> bool:
-    return all(weights.model_dump().values())
+    return min(weights.translation, weights.reconstruction, weights.alignment) > 0
 
 
 def _one_run(params: Params, model: Path, dataset: str, size: int, seed: int, episodes: int) -> Params:
