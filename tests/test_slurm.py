@@ -69,7 +69,6 @@ def test_the_recipe_runs_stages_on_both_nodes(root: Path, tmp_path):
         "SLURM_CPUS_PER_TASK": "1",
         "PATH": f"{commands}:{os.environ['PATH']}",
         "RAY_SYMMETRIC_RUN_CLUSTER_WAIT_TIMEOUT": "120",
-        "RAY_gcs_rpc_server_reconnect_timeout_s": "5",  # how long the second node outlives the first
     }
     process = toy.start("bash", "job.sh", **slurm)
     said, _ = process.communicate(timeout=400)
