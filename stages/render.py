@@ -17,6 +17,7 @@ from anyview.runtime.scratch import checkpoint_folder
 from anyview.runtime.workers import run_tasks
 from anyview.scenes.demonstrations import VIEWS, render_demonstration
 from anyview.seeds import stream
+from anyview.video.marks import write_marks
 from anyview.video.sets import StoredFile, write_clips, write_set
 
 _SHARD = 20  # demonstrations in one video file
@@ -27,8 +28,8 @@ def render_shard(
 ) -> dict[str, Any]:
     """Render the demonstrations ``numbers`` as shard ``index``, unless an earlier try did.
 
-    Returns its row of files.csv and its rows of the manifest. Frames are stored with the losses that those of
-    ingest have.
+    Returns its row of files.csv, its rows of the manifest and the file of its marks. Frames are stored with
+    the losses that those of ingest have.
     """
 
     def make() -> tuple[dict[str, Any], list[str]]:
@@ -37,6 +38,8 @@ def render_shard(
         ]
         clips = np.concatenate([demonstration.clips for demonstration in demonstrations])
         stored = write_clips(folder / f"shard-{index:04d}.avi", clips, 10.0, "XVID")
+        marks = f"marks-{index:04d}.npy"
+        np.save(folder / marks, np.concatenate([demonstration.marks for demonstration in demonstrations]))
         rows = [
             {
                 "clip": f"{paths.RENDERED}-{number:05d}-{view}",
@@ -46,7 +49,7 @@ def render_shard(
             for number, demonstration in zip(numbers, demonstrations, strict=True)
             for view in VIEWS
         ]
-        return {"file": vars(stored), "rows": rows}, [stored.file]
+        return {"file": vars(stored), "rows": rows, "marks": marks}, [stored.file, marks]
 
     return once(folder, f"shard-{index:04d}", make)
 
@@ -73,6 +76,8 @@ def main(arguments: list[str]) -> None:
     with whole_folder(paths.clip_set(paths.RENDERED)) as output:
         for stored in files:
             shutil.copyfile(folder / stored.file, output / stored.file)
+        marks = [np.load(folder / record["marks"], allow_pickle=False) for record in records]
+        write_marks(output, np.concatenate(marks))
         write_set(output, pd.DataFrame([row for record in records for row in record["rows"]]), files)
     shutil.rmtree(folder)
 

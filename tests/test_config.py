@@ -94,6 +94,12 @@ def test_the_committed_params_are_sound():
             {"task": "push", "contexts": "choice", "demos": 4},
             "beyond.split.wide: missing key",
         ),
+        ("beyond.cells.clock.own_clips", True, "beyond.cells.clock: own_clips: a clock hears of no clip"),
+        (
+            "beyond.cells.clips-1.incomplete",
+            {"every": 30, "until": 0.5},
+            "beyond.cells.clips-1.incomplete: no frame but the first would be left",
+        ),
         (
             "beyond.cells.ours",
             VALUES["beyond"]["cells"]["choice"],
@@ -186,6 +192,11 @@ def test_the_committed_params_are_sound():
             "evidence.translators: 'tcn' is none of these: real-adam, ",
         ),
         ("evidence.seeds", [1, 2, 1], "evidence: a translator or a seed is listed twice"),
+        (
+            "evidence.translators",
+            ["sim", "real-pretrained"],
+            "evidence.translators: real-pretrained pretrains, and those of the evidence do not",
+        ),
         ("real.ingest.frames", 10**6, "real.ingest.frames: Input should be less than or equal to 10000"),
     ],
 )

@@ -108,7 +108,7 @@ def test_every_import_is_declared():
         name: {dist.lower().replace("_", "-") for dist in distributions.get(name, [name])} for name in used
     }
     extras = project["optional-dependencies"]
-    optional = names([*extras["cluster"], *extras["lerobot"]])
+    optional = names([*extras["cluster"], *extras["lerobot"], *extras["share"]])
     assert {name for name, found in owners.items() if not found & (required | optional)} == set()
     assert required - set().union(*owners.values()) == set()
 

@@ -151,6 +151,10 @@ class LossWeights(Block):
     translation: NonNegative
     reconstruction: NonNegative
     alignment: NonNegative
+    places: NonNegative = Field(
+        default=0.0,
+        description="of keypoints away from marks: for the architecture `keypoint`, on clips with marks",
+    )
 
     @model_validator(mode="after")
     def _some_loss(self) -> "LossWeights":
@@ -170,7 +174,7 @@ class TranslatorCell(Block):
     """Stage `train`: one context translator."""
 
     dataset: str = Field(description="set of clips to learn from")
-    architecture: Literal["real", "sim", "compact"]
+    architecture: Literal["real", "sim", "compact", "keypoint"]
     optimizer: Literal["adam", "adadelta"]
     iterations: Count
     weights: LossWeights
@@ -179,6 +183,7 @@ class TranslatorCell(Block):
     )
     pretraining: Pretraining
     augment: bool = Field(description="augment the contexts during training")
+    mirror: bool = Field(default=False, description="mirror half of the clips during training")
     task_embedding: bool = Field(
         default=False,
         description="give T the mean of Enc1 over 8 frames of the expert's clip; not in the thesis",
@@ -281,6 +286,23 @@ class RewardWeights(Block):
         return self
 
 
+class Incomplete(Block):
+    """Clips that lack frames. The reward is given only at the steps of which there is a frame."""
+
+    every: Annotated[int, Field(ge=1, le=49)] = Field(
+        default=1, description="n where every n-th frame is there, from the first on"
+    )
+    until: Annotated[float, Field(gt=0, le=1)] = Field(
+        default=1.0, description="the part of the clip, from its start, after which there is none"
+    )
+
+    @model_validator(mode="after")
+    def _some_frame(self) -> "Incomplete":
+        if self.every > 49 * self.until:
+            raise ValueError("no frame but the first would be left")
+        return self
+
+
 class DemonstrationCell(Block):
     """One method rewarded by a demonstration in the agent's own view (equations 20 to 22)."""
 
@@ -292,6 +314,10 @@ class DemonstrationCell(Block):
     model: str = Field(description="the translator: a cell of `translators`")
     weights: RewardWeights
     time_power: NonNegative = Field(description="reward at step t is weighted by (t/49) to this power")
+    incomplete: Incomplete = Field(
+        default=Incomplete(),
+        description="which frames there are: every n-th (`every`), up to a part of the clip (`until`)",
+    )
 
 
 class EmbeddingRewardCell(Block):
@@ -346,6 +372,18 @@ class BeyondCell(DemonstrationCell):
     demonstrations: Count = Field(
         description="clips that are imitated, of each choice; of a `clock`, training clips that it averages"
     )
+    own_clips: bool = Field(
+        default=False, description="every context imitates clips of its own, not all of them the same"
+    )
+    contexts: Literal["evaluation", "tuning"] = Field(
+        default="evaluation", description="the random stream that the contexts are drawn from"
+    )
+
+    @model_validator(mode="after")
+    def _clips_to_own(self) -> "BeyondCell":
+        if self.own_clips and self.reward == "clock":
+            raise ValueError("own_clips: a clock hears of no clip")
+        return self
 
 
 class Beyond(Block):
@@ -493,7 +531,7 @@ def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
 
 
 def _refuse_pretraining_alone(params: Params, name: str) -> None:
-    """Refuse a translator that would never see clips of its own."""
+    """Refuse a translator that would never see clips of its own, or whose other clips nobody would open."""
     blocks = {"translators": params.translators, "beyond.translators": params.beyond.translators}
     for block, cells in blocks.items():
         for key, cell in cells.items():
@@ -503,6 +541,11 @@ def _refuse_pretraining_alone(params: Params, name: str) -> None:
                     f"{name}: {block}.{key}.pretraining.iterations: {before} must be below "
                     f"{block}.{key}.iterations, {all_of_them}, which counts them"
                 )
+    for key in params.evidence.translators:
+        if params.translators[key].pretraining.iterations:
+            raise AnyviewError(
+                f"{name}: evidence.translators: {key} pretrains, and those of the evidence do not"
+            )
 
 
 def _refuse_twins(params: Params, name: str) -> None:

@@ -1,5 +1,7 @@
 """Random scenes: the rig's task in them, and nothing else of the rig."""
 
+import colorsys
+import math
 import os
 import subprocess
 import sys
@@ -9,9 +11,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from anyview.assessment.yardsticks import find_object
 from anyview.scenes import looks
 from anyview.scenes.camera import View
-from anyview.scenes.demonstrations import DURATION, Demonstration, render_demonstration
+from anyview.scenes.demonstrations import DURATION, MARKS, Demonstration, render_demonstration
 from anyview.scenes.operator import sample_operator
 from anyview.scenes.shapes import Shape
 from anyview.scenes.tabletop import sample_object, sample_room, sample_target, sample_things
@@ -63,6 +66,40 @@ def test_both_views_show_the_push_at_the_same_moments(demonstrations):
     assert len(changes["object"]) > 20
     assert np.median(changes["object"]) > 8 * np.median(changes["elsewhere"])
     assert np.mean(np.array(changes["object"]) > 2 * np.array(changes["elsewhere"])) > 0.9
+
+
+def test_marks_are_where_things_are(demonstrations):
+    """Object, target and tool by OpenCV's pinhole; and where the object is blue, its pixels say the same."""
+    gaps = []
+    for shot in demonstrations:
+        for view, clip, marks in zip(shot.views, shot.clips, shot.marks, strict=True):
+            cups, objects = (np.stack(part) for part in zip(*map(shot.push.at, shot.times), strict=True))
+            places = {name: marks[:, index] for index, name in enumerate(MARKS)}
+            np.testing.assert_allclose(places["object"], seen(view, objects), atol=0.01)
+            np.testing.assert_allclose(
+                places["target"][:1], seen(view, shot.push.target_xy[None], 0.0), atol=0.01
+            )
+            low = cups[:, 2].argmin()  # the tool where it touches the table
+            height = cups[low, 2] + 0.02
+            np.testing.assert_allclose(
+                places["tool"][low], seen(view, cups[low : low + 1, :2], height)[0], atol=0.01
+            )
+            for frame, place in zip(clip, places["object"], strict=True):
+                x, y = place.round().astype(int)
+                red, green, blue = frame[y, x].astype(int)
+                if blue > 60 and blue > 1.6 * max(red, green):  # a blue one, and nothing before it
+                    gaps.append(math.dist(find_object(frame), place))
+    assert len(gaps) > 30
+    assert np.median(gaps) < 1.2
+
+
+def test_beside_a_blue_object_nothing_else_is_blue():
+    for seed in range(60):
+        rng = stream(seed, "blue")
+        push = sample_push(rng)
+        things = sample_things(rng, push, (0.05, 0.1, 0.9))
+        hues = [colorsys.rgb_to_hsv(*thing.surface.colour) for thing in things]
+        assert not any(0.52 < hue < 0.72 and vivid > 0.5 and bright > 0.25 for hue, vivid, bright in hues)
 
 
 def test_object_and_target_stay_inside_both_pictures(demonstrations):
@@ -127,7 +164,7 @@ def shapes(rng: np.random.Generator, push: Push) -> list[Shape]:
         *sample_operator(rng).posed(push.cup[0]),
         *sample_room(rng, table, [0.0, 2.0]),
         *sample_target(rng, push, table, thing[0].surface.colour),
-        *sample_things(rng, push),
+        *sample_things(rng, push, thing[0].surface.colour),
     ]
 
 
@@ -160,10 +197,11 @@ def test_one_worker_or_two_make_the_same_set_of_pairs(root, tmp_path, monkeypatc
     monkeypatch.chdir(tmp_path / "2")
     dataset = open_dataset("rendered")
     assert dataset.frames.shape == (46, 2, 48, 48, 3)
+    assert dataset.marks.shape == (46, 2, len(MARKS), 2)
     assert len(dataset.split("validation")) == 4  # whole pairs
     for source, target in clip_pairs(dataset, "validation"):
         assert source != target
         assert dataset.clips["pair"].iloc[source] == dataset.clips["pair"].iloc[target]
     times = pd.read_csv("data/clips/rendered/manifest.csv").groupby("pair")["times"]
     assert (times.nunique() == 1).all()
-    assert times.first().nunique() == 23
+    assert times.first().nunique() > 20  # two of them may fall on the same hundredth of a second

@@ -21,6 +21,18 @@ def disc_clips(count: int, size: int = SIZE, length: int = LENGTH, seed: int = 0
     return clips
 
 
+def disc_marks(count: int, size: int = SIZE, length: int = LENGTH, seed: int = 0) -> np.ndarray:
+    """Where disc and square are in ``disc_clips``: x and y in pixels, float32 (count, length, 2, 2)."""
+    rng = np.random.default_rng(seed)
+    marks = np.empty((count, length, 2, 2), np.float32)
+    for mark in marks:
+        rng.integers(60, 120, 3)
+        start, goal = rng.uniform(0.2 * size, 0.8 * size, (2, 2))
+        mark[:, 0] = (start + (goal - start) * np.linspace(0, 1, length)[:, None])[:, ::-1]
+        mark[:, 1] = goal[::-1]
+    return marks
+
+
 def clip_table(splits: list[str], pairs: list[str] | None = None) -> pd.DataFrame:
     """A manifest with one clip for each of ``splits``."""
     names = [f"clip-{n:03d}" for n in range(len(splits))]

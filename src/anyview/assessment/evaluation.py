@@ -15,8 +15,8 @@ from anyview.assessment.yardsticks import yardsticks
 from anyview.config import Assessment
 from anyview.runtime.device import torch_device, use_threads, worker_count
 from anyview.runtime.progress import track
+from anyview.translator.architectures import Translator
 from anyview.translator.losses import NAMES, alignment_loss, frame_loss
-from anyview.translator.network import ContextTranslator
 from anyview.video.datasets import Dataset, clip_pairs
 from anyview.video.files import write_video
 from anyview.video.pictures import write_png
@@ -35,7 +35,7 @@ class ClipEvaluation:
 
 
 @torch.inference_mode()
-def translate_clip(model: ContextTranslator, clip: np.ndarray, context: np.ndarray) -> np.ndarray:
+def translate_clip(model: Translator, clip: np.ndarray, context: np.ndarray) -> np.ndarray:
     """``clip``, uint8 (T, H, W, 3), as the context of the frame ``context`` (H, W, 3) would show it."""
     device = next(model.parameters()).device
     z2, skips = model.encode_context(to_input(context[None]).to(device))
@@ -46,7 +46,7 @@ def translate_clip(model: ContextTranslator, clip: np.ndarray, context: np.ndarr
 
 
 @torch.inference_mode()
-def evaluate_clip(model: ContextTranslator, dataset: Dataset, source: int, target: int) -> ClipEvaluation:
+def evaluate_clip(model: Translator, dataset: Dataset, source: int, target: int) -> ClipEvaluation:
     """Translate clip ``source`` to the context of clip ``target`` and compare with what happened there.
 
     Losses are on the thesis's scale, means over the clip's frames, all weights 1; ``last_frame`` is L_tr of
@@ -83,7 +83,7 @@ def evaluate_clip(model: ContextTranslator, dataset: Dataset, source: int, targe
 
 
 def evaluate(
-    model: ContextTranslator,
+    model: Translator,
     dataset: Dataset,
     folder: Path,
     params: Assessment,
@@ -127,7 +127,7 @@ def strip(frames: np.ndarray) -> np.ndarray:
 
 
 def _evaluate_clips(
-    model: ContextTranslator, dataset: Dataset, pairs: list[tuple[int, int]]
+    model: Translator, dataset: Dataset, pairs: list[tuple[int, int]]
 ) -> Iterator[ClipEvaluation]:
     with ThreadPoolExecutor(worker_count()) as pool:
         yield from pool.map(lambda pair: evaluate_clip(model, dataset, *pair), pairs)

@@ -7,8 +7,8 @@ import pandas as pd
 import torch
 
 from anyview.runtime.device import worker_count
+from anyview.translator.architectures import Translator
 from anyview.translator.losses import FRAME_SCALE
-from anyview.translator.network import ContextTranslator
 from anyview.video.datasets import Dataset
 from anyview.video.pixels import to_input
 
@@ -16,7 +16,7 @@ _CLIPS = 20
 
 
 def feature_weights(
-    model: ContextTranslator,
+    model: Translator,
     dataset: Dataset,
     pairs: list[tuple[int, int]],
     permutations: int,
@@ -38,9 +38,7 @@ def feature_weights(
 
 
 @torch.inference_mode()
-def _rises(
-    model: ContextTranslator, dataset: Dataset, pair: tuple[int, int], offsets: np.ndarray
-) -> np.ndarray:
+def _rises(model: Translator, dataset: Dataset, pair: tuple[int, int], offsets: np.ndarray) -> np.ndarray:
     """Mean rise of L_tr (T,) when each frame is replaced by the ones ``offsets`` later, around the end."""
     device = next(model.parameters()).device
     expert, true = (to_input(dataset.frames[clip]).to(device) for clip in pair)

@@ -7,7 +7,7 @@ import numpy as np
 
 from anyview.config import RewardWeights
 from anyview.rewards.demonstration import DemonstrationReward, translate_demonstrations
-from anyview.translator.network import ContextTranslator
+from anyview.translator.architectures import Translator
 
 
 class TranslatedReward(gym.Wrapper):
@@ -21,7 +21,7 @@ class TranslatedReward(gym.Wrapper):
     def __init__(
         self,
         env: gym.Env,
-        model: ContextTranslator,
+        model: Translator,
         demonstrations: np.ndarray,
         weights: RewardWeights,
         time_power: float = 0.0,

@@ -15,6 +15,7 @@ from anyview.surrogate.push import OBJECT_RADIUS, TARGET_HALF, Push, sample_push
 from anyview.trigonometry import unit_vector
 
 VIEWS = ("left", "right")
+MARKS = ("object", "target", "tool", "wrist", "elbow")
 DURATION = 8.0  # seconds that a clip lasts
 
 SUPERSAMPLING = 4
@@ -22,10 +23,15 @@ SUPERSAMPLING = 4
 
 @dataclass(frozen=True)
 class Demonstration:
-    """``clips``, uint8 (2, 1 + moments, size, size, 3), and the ``times`` of both, in seconds."""
+    """``clips``, uint8 (2, 1 + moments, size, size, 3), and the ``times`` of both, in seconds.
+
+    ``marks`` (2, 1 + moments, 5, 2) are where the things named in ``MARKS`` are, x and y in pixels, also if
+    hidden. Instead of joints outside of the picture there is the place where the arm leaves it.
+    """
 
     clips: np.ndarray
     times: np.ndarray
+    marks: np.ndarray
     push: Push
     views: tuple[View, View]
 
@@ -41,7 +47,7 @@ def render_demonstration(rng: np.random.Generator, moments: int, size: int) -> D
     operator = sample_operator(rng)
     standing = sample_room(rng, table, [view.azimuth for view in views])
     standing += sample_target(rng, push, table, thing[0].surface.colour)
-    standing += sample_things(rng, push)
+    standing += sample_things(rng, push, thing[0].surface.colour)
     tones = (table, looks.table_colour(rng), looks.colour(rng))
     pictures = [looks.texture(rng, tone) for tone in tones]
     drawn = SUPERSAMPLING * size
@@ -50,13 +56,31 @@ def render_demonstration(rng: np.random.Generator, moments: int, size: int) -> D
     sensors = [Sensor(rng, view.lens, drawn, size) for view in views]
     times = np.concatenate([[0.0], (np.arange(moments) + rng.random(moments)) * (DURATION / moments)])
     clips = np.empty((2, len(times), size, size, 3), np.uint8)
+    marks = np.empty((2, len(times), len(MARKS), 2), np.float32)
     spin = yaw(rng.uniform(0.0, 2 * np.pi))
     for index, time in enumerate(times.tolist()):
         cup, object_xy = push.at(time)
         moving = [*operator.posed(cup), *moved(thing, (*object_xy, 0.0005), spin)]
         for clip, sensor, picture in zip(clips, sensors, camera.shoot(moving), strict=True):
             clip[index] = sensor.expose(picture)
-    return Demonstration(clips, times, push, views)
+        wrist, elbow, _ = operator.joints(cup)
+        points = np.stack(
+            [(*object_xy, 0.02), (*push.target_xy, 0.0), (*cup[:2], cup[2] + 0.02), wrist, elbow]
+        )
+        for places, view in zip(marks, views, strict=True):
+            shown = view.lens.seen(view.camera.project(points))
+            for joint in range(MARKS.index("wrist"), len(MARKS)):
+                shown[joint] = _leaving(shown[joint - 1], shown[joint])
+            places[index] = 0.5 * size * (shown + 1.0) - 0.5
+    return Demonstration(clips, times, marks, push, views)
+
+
+def _leaving(inside: np.ndarray, outside: np.ndarray) -> np.ndarray:
+    """Where the way from ``inside`` to ``outside`` leaves the picture; either may be the other. Both (2,)."""
+    way = outside - inside
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = np.where(way == 0, np.inf, (np.sign(way) - inside) / way)
+    return inside + way * min(1.0, max(float(reach.min()), 0.0))
 
 
 def _sample_views(rng: np.random.Generator) -> tuple[Push, tuple[View, View]]:

@@ -31,6 +31,12 @@ def blue(rng: np.random.Generator) -> Colour:
     return hsv(rng.uniform(0.56, 0.68), rng.uniform(0.65, 1.0), rng.uniform(0.35, 1.0))
 
 
+def is_blue(tone: Colour) -> bool:
+    """Whether ``tone`` could be taken for the object's colour, see ``blue``."""
+    hue, saturation, value = colorsys.rgb_to_hsv(*tone)
+    return 0.5 < hue < 0.74 and saturation > 0.45 and value > 0.2
+
+
 def red(rng: np.random.Generator) -> Colour:
     """The colour that the task's target has most often."""
     return hsv(rng.uniform(-0.04, 0.04), rng.uniform(0.65, 1.0), rng.uniform(0.5, 1.0))

@@ -25,14 +25,19 @@ class Operator:
     lengths: tuple[float, float]  # of upper arm and forearm
     outwards: np.ndarray  # (3,), where the elbow points
 
-    def posed(self, cup: np.ndarray) -> list[Shape]:
-        """All shapes with the tool at ``cup`` (4,): x, y, height and heading."""
+    def joints(self, cup: np.ndarray) -> np.ndarray:
+        """Wrist, elbow and shoulder (3, 3) with the tool at ``cup`` (4,): x, y, height and heading."""
         x, y, height, heading = cup.tolist()
         back, up = unit_vector(self.tilt)[::-1] * self.wrist
         east, north = unit_vector(heading)
         wrist = np.array([x - back * east, y - back * north, height + 0.02 + up])
         shoulder = lean(self.shoulder, wrist, sum(self.lengths))
-        elbow = bend(shoulder, wrist, *self.lengths, self.outwards)
+        return np.stack([wrist, bend(shoulder, wrist, *self.lengths, self.outwards), shoulder])
+
+    def posed(self, cup: np.ndarray) -> list[Shape]:
+        """All shapes with the tool at ``cup`` (4,), as ``joints`` has it."""
+        x, y, height, heading = cup.tolist()
+        wrist, elbow, shoulder = self.joints(cup)
         torso = (shoulder - self.shoulder) * (1.0, 1.0, 0.0)
         return [
             *moved(self.tool, (x, y, height), yaw(heading)),

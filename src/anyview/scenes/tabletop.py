@@ -10,12 +10,14 @@ from anyview.scenes.shapes import Colour, Shape, Surface, box, capsule, cylinder
 from anyview.surrogate.push import OBJECT_RADIUS, TARGET_HALF, Push
 from anyview.trigonometry import unit_vector
 
+Paint = Callable[[np.random.Generator], Colour]
+
 _CONTRAST = 0.35  # that an object has with the table, at least
 
 
 def sample_object(rng: np.random.Generator, table: Colour) -> list[Shape]:
-    """The object in its own frame: most often round, and blue every second time."""
-    tone = looks.blue(rng) if rng.random() < 0.5 else looks.colour(rng)
+    """The object in its own frame: most often round and blue."""
+    tone = looks.blue(rng) if rng.random() < 0.8 else looks.colour(rng)
     while looks.contrast(tone, table) < _CONTRAST:
         tone = looks.colour(rng)
     look = looks.surface(rng, tone)
@@ -35,8 +37,8 @@ def sample_object(rng: np.random.Generator, table: Colour) -> list[Shape]:
 
 
 def sample_target(rng: np.random.Generator, push: Push, table: Colour, object_tone: Colour) -> list[Shape]:
-    """The flat target in its place: most often square, and red two times of five."""
-    tone = looks.red(rng) if rng.random() < 0.4 else looks.colour(rng)
+    """The flat target in its place: most often square, and red three times of five."""
+    tone = looks.red(rng) if rng.random() < 0.6 else looks.colour(rng)
     while min(looks.contrast(tone, table), looks.contrast(tone, object_tone)) < _CONTRAST:
         tone = looks.colour(rng)
     look = Surface(tone, specular=0.1 * rng.random(), casts_shadow=False)
@@ -56,17 +58,21 @@ def sample_target(rng: np.random.Generator, push: Push, table: Colour, object_to
     return moved(shapes, (*push.target_xy, 0.001), yaw(push.target_yaw))
 
 
-def sample_things(rng: np.random.Generator, push: Push) -> list[Shape]:
-    """Other things on the table, none to two dozen of them, out of the way of the push."""
+def sample_things(rng: np.random.Generator, push: Push, object_tone: Colour) -> list[Shape]:
+    """Other things on the table, none to two dozen of them, out of the way of the push.
+
+    Beside a blue object none of them is blue: nothing else would tell which one will be pushed.
+    """
     most = rng.choice([2, 8, 25], p=[0.35, 0.35, 0.30])
     count = int(rng.integers(0, most + 1))
     swept = np.concatenate([push.cup[::20, :2], push.object_xy[::20]])
     discs = [(*push.target_xy, TARGET_HALF * 1.6)]
-    palette = [looks.colour(rng) for _ in range(int(rng.integers(1, 9)))]
+    paint = _no_blue if looks.is_blue(object_tone) else looks.colour
+    palette = [paint(rng) for _ in range(int(rng.integers(1, 9)))]
     shapes: list[Shape] = []
     for _ in range(count):
-        tone = palette[rng.integers(len(palette))] if rng.random() < 0.6 else looks.colour(rng)
-        thing, radius = _THINGS[rng.integers(len(_THINGS))](rng, looks.surface(rng, tone))
+        tone = palette[rng.integers(len(palette))] if rng.random() < 0.6 else paint(rng)
+        thing, radius = _THINGS[rng.integers(len(_THINGS))](rng, looks.surface(rng, tone), paint)
         for _ in range(12):
             x, y = rng.uniform(-0.46, 0.46), rng.uniform(-0.28, 0.40)
             clear = np.hypot(*(swept - (x, y)).T).min() > radius + 0.065
@@ -77,42 +83,49 @@ def sample_things(rng: np.random.Generator, push: Push) -> list[Shape]:
     return shapes
 
 
-def _block(rng: np.random.Generator, look: Surface) -> tuple[list[Shape], float]:
+def _no_blue(rng: np.random.Generator) -> Colour:
+    tone = looks.colour(rng)
+    while looks.is_blue(tone):
+        tone = looks.colour(rng)
+    return tone
+
+
+def _block(rng: np.random.Generator, look: Surface, paint: Paint) -> tuple[list[Shape], float]:
     x, y, z = rng.uniform(0.015, 0.06), rng.uniform(0.015, 0.05), rng.uniform(0.008, 0.05)
     shapes = [box((x, y, z), (0, 0, z), look)]
     if rng.random() < 0.4:
-        lid = looks.surface(rng, looks.colour(rng), casts_shadow=False)
+        lid = looks.surface(rng, paint(rng), casts_shadow=False)
         shapes.append(box((x * 0.9, y * 0.9, 0.003), (0, 0, 2 * z), lid))
     return shapes, math.hypot(x, y)
 
 
-def _can(rng: np.random.Generator, look: Surface) -> tuple[list[Shape], float]:
+def _can(rng: np.random.Generator, look: Surface, paint: Paint) -> tuple[list[Shape], float]:
     radius, half = rng.uniform(0.018, 0.05), rng.uniform(0.01, 0.065)
     shapes = [cylinder(radius, half, (0, 0, half), look)]
     if rng.random() < 0.6:
-        inside = Surface(looks.colour(rng), casts_shadow=False)
+        inside = Surface(paint(rng), casts_shadow=False)
         shapes.append(cylinder(radius * rng.uniform(0.3, 0.9), 0.001, (0, 0, 2 * half), inside))
     if rng.random() < 0.3:
         shapes.append(capsule((radius, 0, half * 0.6), (radius + 0.015, 0, half * 1.4), 0.006, look))
     return shapes, radius + 0.01
 
 
-def _ball(rng: np.random.Generator, look: Surface) -> tuple[list[Shape], float]:
+def _ball(rng: np.random.Generator, look: Surface, paint: Paint) -> tuple[list[Shape], float]:
     radius, flat = rng.uniform(0.015, 0.04), rng.uniform(0.5, 1.0)
     long = radius * rng.choice([1.0, rng.uniform(1.0, 1.7)])
     return [ellipsoid((long, radius, radius * flat), (0, 0, radius * flat), look)], long
 
 
-def _stick(rng: np.random.Generator, look: Surface) -> tuple[list[Shape], float]:
+def _stick(rng: np.random.Generator, look: Surface, paint: Paint) -> tuple[list[Shape], float]:
     half, radius = rng.uniform(0.03, 0.10), rng.uniform(0.003, 0.008)
     shapes = [capsule((-half, 0, radius), (half, 0, radius), radius, look)]
     if rng.random() < 0.4:
-        tip = looks.surface(rng, looks.colour(rng), casts_shadow=False)
+        tip = looks.surface(rng, paint(rng), casts_shadow=False)
         shapes.append(capsule((half * 0.5, 0, radius), (half, 0, radius), radius * 1.2, tip))
     return shapes, half
 
 
-def _sheet(rng: np.random.Generator, look: Surface) -> tuple[list[Shape], float]:
+def _sheet(rng: np.random.Generator, look: Surface, paint: Paint) -> tuple[list[Shape], float]:
     x, y, z = (
         rng.uniform(0.025, 0.11),
         rng.uniform(0.025, 0.08),
@@ -120,32 +133,32 @@ def _sheet(rng: np.random.Generator, look: Surface) -> tuple[list[Shape], float]
     )
     shapes = [box((x, y, z), (0, 0, z), look)]
     if rng.random() < 0.5:
-        printed = Surface(looks.colour(rng), casts_shadow=False)
+        printed = Surface(paint(rng), casts_shadow=False)
         shapes.append(
             box((x * rng.uniform(0.4, 0.95), y * rng.uniform(0.4, 0.95), 0.0006), (0, 0, 2 * z), printed)
         )
     return shapes, math.hypot(x, y)
 
 
-def _bottle(rng: np.random.Generator, look: Surface) -> tuple[list[Shape], float]:
+def _bottle(rng: np.random.Generator, look: Surface, paint: Paint) -> tuple[list[Shape], float]:
     radius, half = rng.uniform(0.018, 0.036), rng.uniform(0.03, 0.075)
-    neck = looks.surface(rng, looks.colour(rng))
+    neck = looks.surface(rng, paint(rng))
     return [
         cylinder(radius, half, (0, 0, half), look),
         cylinder(radius * rng.uniform(0.3, 0.6), half * 0.3, (0, 0, 2.3 * half), neck),
     ], radius
 
 
-def _plate(rng: np.random.Generator, look: Surface) -> tuple[list[Shape], float]:
+def _plate(rng: np.random.Generator, look: Surface, paint: Paint) -> tuple[list[Shape], float]:
     radius, half = rng.uniform(0.04, 0.09), rng.uniform(0.002, 0.012)
-    middle = looks.surface(rng, looks.colour(rng), casts_shadow=False)
+    middle = looks.surface(rng, paint(rng), casts_shadow=False)
     return [
         cylinder(radius, half, (0, 0, half), look),
         cylinder(radius * rng.uniform(0.3, 0.9), 0.001, (0, 0, 2 * half), middle),
     ], radius
 
 
-_THINGS: tuple[Callable[[np.random.Generator, Surface], tuple[list[Shape], float]], ...] = (
+_THINGS: tuple[Callable[[np.random.Generator, Surface, Paint], tuple[list[Shape], float]], ...] = (
     _block,
     _block,
     _can,

@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
+from anyview.translator.losses import Marks
 from anyview.video.datasets import Dataset
 from anyview.video.pixels import to_input
 
@@ -70,6 +71,29 @@ class Augmentation:
             inside = _ellipses(place, radii, size).to(device)
             frames = torch.where(inside & still, pieces, frames)
         return frames
+
+
+def mirror(
+    paired: Tensor, context: Tensor, clip: Tensor | None, marks: Marks | None, rng: np.random.Generator
+) -> tuple[Tensor, Tensor, Tensor | None, Marks | None]:
+    """Half of the experts' clips and half of the contexts mirrored, marks too; see ``batch_losses``."""
+    experts, contexts = (
+        torch.from_numpy(rng.random(len(context)) < 0.5).to(context.device) for _ in range(2)
+    )
+
+    def flip(frames: Tensor, which: Tensor) -> Tensor:
+        return torch.where(which.view(-1, *[1] * (frames.ndim - 1)), frames.flip(-1), frames)
+
+    def reflect(places: Tensor, which: Tensor) -> Tensor:
+        return torch.where(which[:, None, None], places * places.new_tensor((-1.0, 1.0)), places)
+
+    both = torch.cat((experts, contexts))
+    return (
+        flip(paired, both),
+        flip(context, contexts),
+        None if clip is None else flip(clip, experts),
+        None if marks is None else Marks(reflect(marks.paired, both), reflect(marks.context, contexts)),
+    )
 
 
 def _shift(pictures: Tensor, offsets: np.ndarray) -> Tensor:

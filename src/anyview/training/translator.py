@@ -11,19 +11,19 @@ from anyview.config import Training, TranslatorCell
 from anyview.runtime.device import products_in
 from anyview.runtime.errors import AnyviewError
 from anyview.seeds import stream, torch_seed
-from anyview.training.augmentation import Augmentation
+from anyview.training.augmentation import Augmentation, mirror
 from anyview.training.common.batches import FramePairs, training_pairs, training_views, validation_pairs
 from anyview.training.common.optimization import MakeOptimizer
-from anyview.translator.losses import NAMES, Losses, batch_losses
-from anyview.translator.network import ContextTranslator, task_frames
+from anyview.translator.architectures import Translator, make_translator
+from anyview.translator.losses import NAMES, Losses, Marks, batch_losses
 from anyview.translator.weights import save_translator
 from anyview.video.datasets import Dataset
 from anyview.video.pixels import to_input
 
 _OPTIMIZERS: dict[str, MakeOptimizer] = {
     "adam": lambda parameters: torch.optim.Adam(parameters, fused=True),
-    # The averages and the constant of TensorFlow, the thesis's framework; PyTorch's own are 0.9 and 1e-6.
-    "adadelta": lambda parameters: torch.optim.Adadelta(parameters, rho=0.95, eps=1e-8, foreach=True),
+    # TensorFlow 2's beside its rate, 0.001, the one that the thesis states; PyTorch's own are 0.9 and 1e-6.
+    "adadelta": lambda parameters: torch.optim.Adadelta(parameters, rho=0.95, eps=1e-7, foreach=True),
 }
 
 
@@ -60,13 +60,11 @@ class TranslatorObjective:
         """Of the sets of clips that the training reads."""
         return [dataset.name for dataset in self._learnt()]
 
-    def network(self) -> ContextTranslator:
+    def network(self) -> Translator:
         """With the same first weights for every cell of an architecture: ablations differ in losses alone."""
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(torch_seed(self.seed, "translator/weights"))
-            model = ContextTranslator(
-                self.cell.architecture, self.dataset.image_size, self.cell.task_embedding
-            )
+            model = make_translator(self.cell.architecture, self.dataset.image_size, self.cell.task_embedding)
         return model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
     def batch(self, iteration: int) -> FramePairs:
@@ -75,11 +73,15 @@ class TranslatorObjective:
         draw = {"any": training_pairs, "views": training_views}[self.cell.pairs]
         return draw(self._learnt_at(iteration), rng, self.training.batch_size)
 
-    def losses(self, model: ContextTranslator, pairs: FramePairs, iteration: int, part: int) -> Tensor:
-        """(4,), with dropout and augmentation."""
+    def losses(self, model: Translator, pairs: FramePairs, iteration: int, part: int) -> Tensor:
+        """(4,), with dropout and augmentation. L has L_places in it where the cell weighs that."""
         device = next(model.parameters()).device
         dataset = self._learnt_at(iteration)
-        paired, context, clip = self._frames(dataset, pairs, device)
+        paired, context, clip = self._frames(model, dataset, pairs)
+        marks = self._marks(dataset, pairs, device)
+        if self.cell.mirror:
+            rng = stream(self.seed, "translator/mirror", iteration, part)
+            paired, context, clip, marks = mirror(paired, context, clip, marks, rng)
         if augmentation := self._augmentations.get(dataset.name):
             rng = stream(self.seed, "translator/augmentation", iteration, part)
             expert, target = paired.chunk(2)
@@ -91,7 +93,7 @@ class TranslatorObjective:
         seed = torch_seed(self.seed, "translator/dropout", iteration, part)
         noise = torch.Generator(device).manual_seed(seed)
         with products_in(self.training.precision, device):
-            losses = batch_losses(model, paired, context, clip, self.cell.weights, noise)
+            losses = batch_losses(model, paired, context, clip, self.cell.weights, noise, marks)
         return torch.stack((losses.total(self.cell.weights), *losses.parts()))
 
     def validation(self) -> list[FramePairs]:
@@ -100,11 +102,11 @@ class TranslatorObjective:
         pairs = validation_pairs(self.dataset, stream(self.seed, "translator/validation"), count)
         return pairs.parts(-(-count // self.training.batch_size))
 
-    def validation_losses(self, model: ContextTranslator, pairs: FramePairs) -> Tensor:
+    def validation_losses(self, model: Translator, pairs: FramePairs) -> Tensor:
         """L_tr, L_rec and L_align, (3,)."""
         device = next(model.parameters()).device
         with products_in(self.training.precision, device):
-            losses = batch_losses(model, *self._frames(self.dataset, pairs, device))
+            losses = batch_losses(model, *self._frames(model, self.dataset, pairs))
         return torch.stack(losses.parts())
 
     def validation_row(self, means: Tensor) -> dict[str, float]:
@@ -112,7 +114,7 @@ class TranslatorObjective:
         total = float(Losses(*means).total(self.cell.weights))
         return {"loss": total} | dict(zip(NAMES, means.tolist(), strict=True))
 
-    def save(self, folder: Path, model: ContextTranslator, meta: dict[str, Any]) -> None:
+    def save(self, folder: Path, model: Translator, meta: dict[str, Any]) -> None:
         """Write a model folder."""
         save_translator(folder, model, meta)
 
@@ -123,14 +125,25 @@ class TranslatorObjective:
         return self._pretraining if iteration < self.cell.pretraining.iterations else self.dataset
 
     def _frames(
-        self, dataset: Dataset, pairs: FramePairs, device: torch.device
+        self, model: Translator, dataset: Dataset, pairs: FramePairs
     ) -> tuple[Tensor, Tensor, Tensor | None]:
         """o_t^i, o_t^j (2N, 3, H, W); o_0^j (N, 3, H, W); frames of the clips i to embed (N, K, 3, H, W)."""
+
+        device = next(model.parameters()).device
 
         def load(frames: np.ndarray) -> Tensor:
             return to_input(torch.from_numpy(frames).to(device))
 
-        clip = None
-        if self.cell.task_embedding:
-            clip = load(pairs.clips(dataset, task_frames(dataset.length)))
+        steps = model.task_frames(dataset.length)
+        clip = load(pairs.clips(dataset, steps)) if len(steps) else None
         return load(pairs.frames(dataset)), load(pairs.contexts(dataset)), clip
+
+    def _marks(self, dataset: Dataset, pairs: FramePairs, device: torch.device) -> Marks | None:
+        """Where the cell weighs L_places and the set has marks."""
+        found = pairs.marks(dataset) if self.cell.weights.places else None
+        if found is None:
+            return None
+        in_units = [
+            (2 * torch.from_numpy(pixels).to(device) + 1) / dataset.image_size - 1 for pixels in found
+        ]
+        return Marks(*in_units)

@@ -5,32 +5,50 @@ times the mean (inferred: the thesis does not say). So the scale stays the same 
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import torch
 from torch import Generator, Tensor
 from torch.nn import functional as F
 
 from anyview.config import LossWeights
-from anyview.translator.network import ContextTranslator
+from anyview.translator.architectures import Translator
+from anyview.translator.keypoints import KeypointTranslator, place_loss
 
 FRAME_SCALE = 100 / 2
 ALIGNMENT_SCALE = 1000
+PLACE_SCALE = (
+    50_000  # ours: an object a pixel of 48 away from its place costs 87, and one beside the picture most
+)
 
 NAMES = ("translation", "reconstruction", "alignment")
 
 
+class Marks(NamedTuple):
+    """Where M known things are in the frames of a batch, x and y from -1 to 1 within a picture."""
+
+    paired: Tensor
+    """(2N, M, 2)."""
+    context: Tensor
+    """(N, M, 2)."""
+
+
 @dataclass(frozen=True)
 class Losses:
-    """L_tr, L_rec and L_align of a batch, scalars; None where a loss was left out."""
+    """L_tr, L_rec and L_align of a batch, scalars; None where a loss was left out.
+
+    ``places`` is ours, and there for keypoints and clips with marks.
+    """
 
     translation: Tensor | None
     reconstruction: Tensor | None
     alignment: Tensor | None
+    places: Tensor | None = None
 
     def total(self, weights: LossWeights) -> Tensor:
-        """L = w_tr L_tr + w_rec L_rec + w_align L_align of the losses that are there."""
-        parts = [getattr(weights, name) * loss for name in NAMES if (loss := getattr(self, name)) is not None]
+        """L = w_tr L_tr + w_rec L_rec + w_align L_align + w_places L_places of the losses that are there."""
+        names = (*NAMES, "places")
+        parts = [getattr(weights, name) * loss for name in names if (loss := getattr(self, name)) is not None]
         return sum(parts[1:], parts[0])
 
     def parts(self) -> list[Tensor]:
@@ -67,18 +85,20 @@ def alignment_loss(z3: Tensor, z_true: Tensor) -> Tensor:
 
 
 def batch_losses(
-    model: ContextTranslator,
+    model: Translator,
     paired: Tensor,
     context: Tensor,
     clip: Tensor | None = None,
     wanted: LossWeights | None = None,
     noise: Generator | None = None,
+    marks: Marks | None = None,
 ) -> Losses:
     """Losses of ``paired`` (2N, 3, H, W), o_t^i and after them o_t^j, and ``context`` o_0^j (N, 3, H, W).
 
     Frames are in [-1, 1]. ``clip`` (N, K, 3, H, W) are ``task_frames`` of the expert's clips, if T is given a
     task embedding. With ``wanted`` only the losses whose weight is above 0 are computed; ``noise``
-    turns dropout on. What the decoder makes of the skips is computed once for both decodings.
+    turns dropout on. With ``marks`` there is L_places, of a translator of keypoints. What the decoder makes
+    of the skips is computed once for both decodings.
     """
     target = paired[len(context) :]
     z1, z_true = model.encode_expert(paired, noise).chunk(2)
@@ -92,6 +112,11 @@ def batch_losses(
     z3 = model.translate(z1, z2, task, noise)
     skip_terms = model.decoder.skip_terms(skips)
 
+    places = None
+    if marks is not None and isinstance(model, KeypointTranslator):
+        found = place_loss(torch.cat((z1, z_true, z2)), torch.cat(marks))
+        places = PLACE_SCALE * (found + place_loss(z3, marks.paired[len(context) :]))
+
     def decoding_loss(z: Tensor) -> Tensor:
         return frame_loss(model.decoder(z, skip_terms, noise), target)
 
@@ -99,4 +124,5 @@ def batch_losses(
         decoding_loss(z3) if wanted is None or wanted.translation else None,
         decoding_loss(z_true) if wanted is None or wanted.reconstruction else None,
         alignment_loss(z3, z_true) if wanted is None or wanted.alignment else None,
+        places if wanted is not None and wanted.places else None,
     )

@@ -86,10 +86,10 @@ class Encoder(nn.Module):
         maps = []
         x = frames
         for convolution in self.convolutions:
-            x = _activate(convolution(x))
+            x = activate(convolution(x))
             maps.append(x)
         flat = x.movedim(1, -1).flatten(1)  # (row, column, channel): no copy in channels_last
-        hidden = _activate(self.hidden(_drop(flat, self._dropout, noise)))
+        hidden = activate(self.hidden(_drop(flat, self._dropout, noise)))
         return self.output(_drop(hidden, self._dropout, noise)), maps
 
 
@@ -104,7 +104,7 @@ class Translation(nn.Module):
 
     def forward(self, features: list[Tensor], noise: Generator | None = None) -> Tensor:
         joined = torch.cat(features, dim=1)
-        hidden = _activate(self.hidden(_drop(joined, self._dropout, noise)))
+        hidden = activate(self.hidden(_drop(joined, self._dropout, noise)))
         return self.output(_drop(hidden, self._dropout, noise))
 
 
@@ -165,17 +165,17 @@ class Decoder(nn.Module):
         return [layer.skip_terms(skip) for layer, skip in zip(layers, reversed(skips), strict=True)]
 
     def forward(self, z: Tensor, skip_terms: list[SkipTerms], noise: Generator | None = None) -> Tensor:
-        hidden = _activate(self.hidden(_drop(z, self._dropout, noise)))
+        hidden = activate(self.hidden(_drop(z, self._dropout, noise)))
         hidden = _drop(hidden, self._dropout, noise)
         x = hidden.unflatten(1, (self._side, self._side, -1)).movedim(-1, 1)
         *layers, last = zip(self.convolutions, skip_terms, strict=True)
         for convolution, terms in layers:
-            x = _activate(convolution(x, terms))
+            x = activate(convolution(x, terms))
         convolution, terms = last
         return convolution(x, terms)
 
 
-def _activate(x: Tensor) -> Tensor:
+def activate(x: Tensor) -> Tensor:
     return F.leaky_relu(x, _LEAK, inplace=True)
 
 
@@ -187,23 +187,16 @@ def _drop(x: Tensor, probability: float, noise: Generator | None) -> Tensor:
     return x * torch.empty_like(x).bernoulli_(keep, generator=noise).div_(keep)
 
 
-def task_frames(length: int) -> np.ndarray:
-    """Steps of a clip of ``length`` frames that its task embedding is made of: the middles of equal parts."""
-    return ((np.arange(_TASK_FRAMES) + 0.5) * length / _TASK_FRAMES).astype(int)
-
-
 class ContextTranslator(nn.Module):
     """The whole translator for square frames of ``image_size`` pixels; ``task_embedding``: T is given one.
 
     Dropout, where the architecture has any, is on where a method is given the generator ``noise`` to draw its
     masks from, and off otherwise, whatever mode the module is in.
-    Raises ``AnyviewError`` for an unknown architecture or a size that its strides do not divide.
+    Raises ``AnyviewError`` for a size that its strides do not divide.
     """
 
     def __init__(self, architecture: ArchitectureName, image_size: int, task_embedding: bool = False):
         super().__init__()
-        if architecture not in ARCHITECTURES:
-            raise AnyviewError(f"architecture {architecture!r}: must be one of {', '.join(ARCHITECTURES)}")
         layers = ARCHITECTURES[architecture]
         if image_size < layers.stride or image_size % layers.stride:
             raise AnyviewError(
@@ -232,9 +225,17 @@ class ContextTranslator(nn.Module):
         """Enc2: z2 (N, width) of first frames (N, 3, H, W), and the four maps that the decoder skips to."""
         return self.context_encoder(frames, noise)
 
+    def task_frames(self, length: int) -> np.ndarray:
+        """Steps of a clip of ``length`` frames that its task embedding is the mean of; none if there is none.
+
+        They are the middles of equal parts.
+        """
+        count = _TASK_FRAMES if self.task_embedding else 0
+        return ((np.arange(count) + 0.5) * length / max(count, 1)).astype(int)
+
     def embed_task(self, z1: Tensor) -> Tensor | None:
         """The task embedding (1, width) of a clip, of its z1 (T, width); None where T is given none."""
-        return z1[task_frames(len(z1))].mean(0, keepdim=True) if self.task_embedding else None
+        return z1[self.task_frames(len(z1))].mean(0, keepdim=True) if self.task_embedding else None
 
     def translate(
         self, z1: Tensor, z2: Tensor, task: Tensor | None = None, noise: Generator | None = None

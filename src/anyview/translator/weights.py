@@ -7,12 +7,13 @@ from torch import Tensor
 
 from anyview.runtime.errors import AnyviewError
 from anyview.runtime.models import read_description, read_weights, write_model
+from anyview.translator.architectures import Translator, make_translator
 from anyview.translator.network import ContextTranslator
 
 _LARGEST = 256  # pixels
 
 
-def save_translator(folder: Path, model: ContextTranslator, meta: dict[str, Any]) -> None:
+def save_translator(folder: Path, model: Translator, meta: dict[str, Any]) -> None:
     """Write weights, a shared encoder's once, and description: architecture, image size and ``meta``."""
     state = {
         name: value
@@ -33,16 +34,16 @@ def read_meta(folder: Path) -> dict[str, Any]:
     return description
 
 
-def load_translator(folder: Path) -> ContextTranslator:
+def load_translator(folder: Path) -> Translator:
     """The saved translator, float32 on the CPU, in evaluation mode with no gradients.
 
     Raises AnyviewError if a file is missing, damaged or does not fit the other.
     """
     meta = read_meta(folder)
-    model = ContextTranslator(meta["architecture"], meta["image_size"], meta.get("task_embedding") is True)
+    model = make_translator(meta["architecture"], meta["image_size"], meta.get("task_embedding") is True)
 
     def restore(state: dict[str, Tensor]) -> None:
-        if model.shared:
+        if isinstance(model, ContextTranslator) and model.shared:
             state |= {name.replace("expert_encoder.", "context_encoder.", 1): state[name] for name in state}
         model.load_state_dict(state)
 

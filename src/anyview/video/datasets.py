@@ -9,17 +9,22 @@ import pandas as pd
 
 from anyview import paths
 from anyview.runtime.errors import AnyviewError
+from anyview.video.marks import marks_file, read_marks
 from anyview.video.sets import open_frames
 from anyview.video.splits import read_split
 
 
 @dataclass(frozen=True)
 class Dataset:
-    """Clips and their splits: ``frames`` uint8 (N, T, H, W, 3), ``clips`` one row for each with its split."""
+    """Clips and their splits: ``frames`` uint8 (N, T, H, W, 3), ``clips`` one row for each with its split.
+
+    ``marks``, float32 (N, T, M, 2), are the places of M known things in pixels, if the set has any.
+    """
 
     name: str
     frames: np.ndarray
     clips: pd.DataFrame
+    marks: np.ndarray | None = None
 
     @property
     def length(self) -> int:
@@ -69,7 +74,7 @@ def open_dataset(name: str) -> Dataset:
         raise AnyviewError(f"{table}: clip {unknown.iloc[0]} is not in {folder}; run the split stage again")
     clips = store.manifest.drop(columns=["pair", "split"], errors="ignore")
     clips = clips.merge(split, on="clip", how="left").fillna({"pair": "", "split": ""})
-    dataset = Dataset(name, store.frames, clips)
+    dataset = Dataset(name, store.frames, clips, read_marks(folder, *store.frames.shape[:2]))
     for wanted, least in (("train", 2), ("validation", 1)):
         groups = dataset.same_choice(dataset.split(wanted))
         if min(map(len, groups), default=0) < least:
@@ -81,7 +86,7 @@ def open_dataset(name: str) -> Dataset:
 def dataset_files(name: str) -> list[Path]:
     """The small files that change whenever a data set does, to key what is made from it."""
     folder, table = paths.clip_set(name), paths.split_table(name)
-    return [folder / "manifest.csv", folder / "files.csv", table]
+    return [folder / "manifest.csv", folder / "files.csv", *marks_file(folder), table]
 
 
 def clip_pairs(dataset: Dataset, split: str) -> list[tuple[int, int]]:

@@ -39,6 +39,14 @@ class FramePairs:
         """Frames ``times`` (K,) of the clips i, uint8 (N, K, H, W, 3); of pairs of one frame each."""
         return dataset.frames[self.sources[:, None], times]
 
+    def marks(self, dataset: Dataset) -> tuple[np.ndarray, np.ndarray] | None:
+        """The marks of ``frames`` (2N, M, 2) and of ``contexts`` (N, M, 2), in pixels, if the set has any."""
+        if dataset.marks is None:
+            return None
+        clips = np.concatenate((self.sources, self.targets))
+        times = np.concatenate((self.times, self.times))
+        return dataset.marks[clips, times], dataset.marks[self.targets, 0]
+
     def contexts(self, dataset: Dataset) -> np.ndarray:
         """o_0^j, uint8 (N, H, W, 3); of pairs of one frame each."""
         return dataset.frames[self.targets, 0]

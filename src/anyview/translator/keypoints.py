@@ -1,0 +1,274 @@
+"""A translator whose code is a list of places: where things are, not what the whole picture is like.
+
+Enc finds keypoints: the mean places under softmaxes over maps (Finn et al. 2016), with what the thing there
+looks like. T tells from the expert's keypoints, now and in the first frame, where those of the target's first
+frame go. Dec draws that: it carries each keypoint's look to its new place as a Gaussian (Jakab et al. 2018,
+Kulkarni et al. 2019), with lines from each to the next along which limbs and tools are drawn, and blends all
+this into the target's first frame by a mask (Ebert et al. 2017), so that whatever stands still is copied.
+
+Same methods as those of ``network.ContextTranslator``, with one encoder for the expert and for the context.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from torch import Generator, Tensor, nn
+from torch.nn import functional as F
+
+from anyview.runtime.errors import AnyviewError
+from anyview.translator.network import activate
+
+KEYPOINTS = 8
+_VECTOR = 32  # entries of a code beside the places, for what these do not say
+_LOOK = 8  # entries that describe what is seen at a keypoint
+_CHANNELS = 16, 32, 64  # of the maps at a half, a quarter and an eighth of the frame's side
+_HIDDEN = 256
+_STRIDE = 8
+_OUTSIDE = 1.1  # where what is outside of the picture counts as being
+_COPIED = 2.0  # subtracted from the mask, so that at first most is copied
+_SIGMA = 1.0  # of a Gaussian, in pixels of the finest map
+
+
+class Seen(NamedTuple):
+    """What the encoder makes of frames (N, 3, H, W)."""
+
+    code: Tensor
+    """(N, 2 K + V): x and y of each keypoint, -1 to 1 from edge to edge, then a vector."""
+    map: Tensor
+    """(N, 16, H/2, W/2)."""
+    looks: Tensor
+    """(N, K, 8), of what is at the keypoints."""
+
+
+class KeypointEncoder(nn.Module):
+    """Maps that shrink thrice and grow back twice, so that a place's meaning depends on all of the frame."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        fine, middle, coarse = _CHANNELS
+        self.down = nn.ModuleList(
+            [_layer(3, fine, 5, 2), _layer(fine, middle, 3, 2), _layer(middle, coarse, 3, 2)]
+        )
+        self.deep = _layer(coarse, coarse, 3)
+        self.everywhere = nn.Linear(coarse, coarse)
+        self.lateral = nn.ModuleList([nn.Conv2d(middle, middle, 1), nn.Conv2d(fine, fine, 1)])
+        self.up = nn.ModuleList([nn.Conv2d(coarse, middle, 1), nn.Conv2d(middle, fine, 1)])
+        self.smooth = nn.ModuleList([_layer(middle, middle, 3), _layer(fine, fine, 3)])
+        self.heat = nn.Conv2d(fine, KEYPOINTS, 1)
+        self.look = nn.Conv2d(fine, _LOOK, 1)
+        self.vector = nn.Linear(coarse, _VECTOR)
+
+    def forward(self, frames: Tensor) -> Seen:
+        fine, middle, coarse = self._shrink(frames)
+        x = self.deep(coarse)
+        pooled = x.mean((2, 3))
+        x = x + self.everywhere(pooled)[:, :, None, None]
+        for skip, lateral, up, smooth in zip((middle, fine), self.lateral, self.up, self.smooth, strict=True):
+            x = smooth(activate(F.interpolate(up(x), scale_factor=2.0) + lateral(skip)))
+        heat = self.heat(x).flatten(2).float().softmax(-1)  # places need more digits than bfloat16 has
+        where = heat.unflatten(2, x.shape[2:])
+        axis = _axis(x)
+        places = torch.stack(((where.sum(2) * axis).sum(-1), (where.sum(3) * axis).sum(-1)), -1)
+        looks = heat @ self.look(x).flatten(2).transpose(1, 2)
+        return Seen(torch.cat((places.flatten(1), self.vector(pooled)), 1), x, looks)
+
+    def _shrink(self, x: Tensor) -> list[Tensor]:
+        maps = []
+        for layer in self.down:
+            x = layer(x)
+            maps.append(x)
+        return maps
+
+
+class KeypointTranslation(nn.Module):
+    """T: where the keypoints of a target's first frame go, as the expert's first and present frames tell.
+
+    Each goes to a weighted sum of all their places, and a step beside it. So "half of the way from the object
+    to the target" is one set of weights for all contexts and points of view.
+    """
+
+    def __init__(self, width: int):
+        super().__init__()
+        self.hidden = nn.ModuleList([nn.Linear(3 * width, _HIDDEN), nn.Linear(_HIDDEN, _HIDDEN)])
+        self.weights = nn.Linear(_HIDDEN, KEYPOINTS**2)
+        self.steps = nn.Linear(_HIDDEN, width)
+        with torch.no_grad():  # at first all stay where they are
+            for layer in (self.weights, self.steps):
+                layer.weight.mul_(0.1)
+                layer.bias.zero_()
+
+    def forward(self, z1: Tensor, z2: Tensor, first: Tensor) -> Tensor:
+        x = torch.cat((z1, z2, first), dim=1)
+        for layer in self.hidden:
+            x = activate(layer(x))
+        mixed = self.weights(x).unflatten(1, (KEYPOINTS, KEYPOINTS)) @ _places(z2)
+        vector = z2[:, 2 * KEYPOINTS :]
+        return z2 + self.steps(x) + torch.cat((mixed.flatten(1), torch.zeros_like(vector)), 1)
+
+
+class DrawingTerms(NamedTuple):
+    """What a ``KeypointDecoder`` computes once for everything that is decoded in the same contexts."""
+
+    first: Tensor
+    """The contexts' first frames, (C, 3, H, W)."""
+    still: Tensor
+    """The context's part of the finest map, (C, 32, H/2, W/2)."""
+    tints: Tensor
+    """What a keypoint or a line adds to that map where it is drawn, (C, 32, 2 K - 1)."""
+
+
+class KeypointDecoder(nn.Module):
+    """Draws the keypoints of codes z (N, 2 K + V) into the contexts' first frames: (N, 3, H, W)."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        fine, middle, coarse = _CHANNELS
+        self.still = nn.Conv2d(fine, middle, 1)
+        self.drawn = nn.Parameter(torch.empty(2 * KEYPOINTS - 1, _LOOK + 1, middle))
+        self.erased = nn.Parameter(torch.empty(2 * KEYPOINTS - 1, _LOOK + 1, middle))
+        for weights in (self.drawn, self.erased):
+            nn.init.normal_(weights, std=(_LOOK + 1) ** -0.5)
+        self.down = nn.ModuleList([_layer(middle, middle, 3, 2), _layer(middle, coarse, 3, 2)])
+        self.vector = nn.Linear(_VECTOR, coarse)
+        self.deep = _layer(coarse, coarse, 3)
+        self.up = nn.ModuleList([_doubling(coarse, middle), _doubling(middle, middle)])
+        self.smooth = nn.ModuleList([_layer(middle, middle, 3), _layer(middle, middle, 3)])
+        self.last_up = _doubling(middle, fine)
+        self.output = nn.Conv2d(fine + 3, 4, 3, padding=1)
+
+    def skip_terms(self, skips: list[Tensor]) -> DrawingTerms:
+        """What ``forward`` needs of what ``KeypointTranslator.encode_context`` returns beside z2."""
+        first, code, finest, looks = skips
+        known = torch.cat((looks, 0.5 * (looks[:, 1:] + looks[:, :-1])), 1)  # of keypoints, then of lines
+        known = torch.cat((known, torch.ones_like(known[..., :1])), -1)
+        drawn, erased = (torch.einsum("nka,kac->nck", known, w) for w in (self.drawn, self.erased))
+        still = self.still(finest)
+        return DrawingTerms(first, still + _paint(erased, _strokes(_places(code), still)), drawn)
+
+    def forward(self, z: Tensor, terms: DrawingTerms, noise: Generator | None = None) -> Tensor:
+        """``z`` (N, ...) in the ``terms`` of C contexts, row n modulo C; ``noise`` is not needed."""
+        first, still, tints = (
+            each if len(each) == len(z) else each.repeat(len(z) // len(each), *[1] * (each.ndim - 1))
+            for each in terms
+        )
+        finest = activate(still + _paint(tints, _strokes(_places(z), still)))
+        middle = self.down[0](finest)
+        x = self.down[1](middle)
+        x = self.deep(x + self.vector(z[:, 2 * KEYPOINTS :])[:, :, None, None])
+        for skip, up, smooth in zip((middle, finest), self.up, self.smooth, strict=True):
+            x = smooth(activate(up(x) + skip))
+        x = self.output(torch.cat((activate(self.last_up(x)), first), 1))
+        return torch.lerp(first, x[:, :3], torch.sigmoid(x[:, 3:] - _COPIED))
+
+
+class KeypointTranslator(nn.Module):
+    """The whole translator for square frames of ``image_size`` pixels.
+
+    Raises ``AnyviewError`` for a size that is no multiple of 8.
+    """
+
+    architecture = "keypoint"
+    width = 2 * KEYPOINTS + _VECTOR
+    shared = True
+    task_embedding = True
+
+    def __init__(self, image_size: int):
+        super().__init__()
+        if image_size < _STRIDE or image_size % _STRIDE:
+            raise AnyviewError(
+                f"architecture {self.architecture}: image size {image_size} must be a multiple of {_STRIDE}"
+            )
+        self.image_size = image_size
+        self.encoder = KeypointEncoder()
+        self.translation = KeypointTranslation(self.width)
+        self.decoder = KeypointDecoder()
+
+    def encode_expert(self, frames: Tensor, noise: Generator | None = None) -> Tensor:
+        """z1 (N, width) of ``frames`` (N, 3, H, W) in [-1, 1]."""
+        return self.encoder(frames).code
+
+    def encode_context(self, frames: Tensor, noise: Generator | None = None) -> tuple[Tensor, list[Tensor]]:
+        """z2 (N, width) of first frames (N, 3, H, W), and what the decoder needs beside codes."""
+        code, finest, looks = self.encoder(frames)
+        return code, [frames, code, finest, looks]
+
+    def task_frames(self, length: int) -> np.ndarray:
+        """Steps of a clip of ``length`` frames whose code T is given beside the present one: the first."""
+        return np.zeros(1, int)
+
+    def embed_task(self, z1: Tensor) -> Tensor:
+        """The code (1, width) of a clip's first frame, of its z1 (T, width)."""
+        return z1[:1]
+
+    def translate(
+        self, z1: Tensor, z2: Tensor, task: Tensor | None = None, noise: Generator | None = None
+    ) -> Tensor:
+        """T: z3 (N, width) of z1 (N, width), z2 and ``task``, the expert's first z1, each (N or 1, width)."""
+        assert task is not None
+        return self.translation(z1, z2.expand_as(z1), task.expand_as(z1))
+
+    def decode(self, z: Tensor, skips: list[Tensor]) -> Tensor:
+        """Dec: frames (N, 3, H, W) of z (N, width) and skips of C contexts, row n in context n modulo C."""
+        return self.decoder(z, self.decoder.skip_terms(skips))
+
+
+def place_loss(codes: Tensor, marks: Tensor) -> Tensor:
+    """Mean squared distance of the first M keypoints of ``codes`` (N, 2 K + V) from ``marks`` (N, M, 2).
+
+    Marks are in the keypoints' units. Those far outside of the picture count as just outside.
+    """
+    gaps = _places(codes)[:, : marks.shape[1]].float() - marks.clamp(-_OUTSIDE, _OUTSIDE)
+    return gaps.square().sum(-1).mean()
+
+
+def _layer(inputs: int, outputs: int, kernel: int, stride: int = 1) -> nn.Sequential:
+    """A convolution, normalised in groups of 8 channels (Wu and He 2018): half of the updates do."""
+    return nn.Sequential(
+        nn.Conv2d(inputs, outputs, kernel, stride, padding=kernel // 2),
+        nn.GroupNorm(outputs // 8, outputs),
+        nn.LeakyReLU(0.2, inplace=True),
+    )
+
+
+def _doubling(inputs: int, outputs: int) -> nn.ConvTranspose2d:
+    return nn.ConvTranspose2d(inputs, outputs, 4, 2, padding=1)
+
+
+def _places(code: Tensor) -> Tensor:
+    """(N, K, 2) of codes (N, 2 K + V)."""
+    return code[:, : 2 * KEYPOINTS].unflatten(1, (KEYPOINTS, 2))
+
+
+def _axis(like: Tensor) -> Tensor:
+    """The centres of the columns, or of the rows, of square maps ``like``, -1 to 1 from edge to edge."""
+    side = like.shape[-1]
+    return (2 * torch.arange(side, device=like.device, dtype=torch.float32) + 1) / side - 1
+
+
+def _strokes(places: Tensor, like: Tensor) -> Tensor:
+    """(N, 2 K - 1, H, W), on maps ``like``: Gaussians of height 1 around ``places`` (N, K, 2) and lines.
+
+    There is a line from each keypoint to the next.
+    """
+    axis = _axis(like)
+    grid = torch.stack(torch.meshgrid(axis, axis, indexing="xy")).flatten(1)  # (2, H W)
+    with torch.autocast(like.device.type, enabled=False):  # differences of squares need all digits
+        squares = _squares(places.float(), grid)
+    return torch.exp(-0.5 * (0.5 * len(axis) / _SIGMA) ** 2 * squares).unflatten(2, like.shape[2:])
+
+
+def _squares(places: Tensor, grid: Tensor) -> Tensor:
+    """Squared distances (N, 2 K - 1, P) of ``grid`` (2, P) from ``places`` (N, K, 2), then from the lines."""
+    # |p - a|^2 of every pixel p and place a, and of lines from a along w what is nearest, t w beyond a.
+    squares = grid.square().sum(0) - 2 * places @ grid + places.square().sum(-1, keepdim=True)
+    start, ways = places[:, :-1], places[:, 1:] - places[:, :-1]
+    along = ways @ grid - (ways * start).sum(-1, keepdim=True)  # (p - a) w
+    length = ways.square().sum(-1, keepdim=True)
+    t = (along / length.clamp(min=1e-6)).clamp(0, 1)
+    return torch.cat((squares, squares[:, :-1] - t * (2 * along - t * length)), 1)
+
+
+def _paint(tints: Tensor, strokes: Tensor) -> Tensor:
+    """(N, C, H, W): the tint of each stroke, of ``tints`` (N, C, S), where that of ``strokes`` is high."""
+    return (tints @ strokes.flatten(2)).unflatten(2, strokes.shape[2:])

@@ -1,0 +1,136 @@
+"""The translator of keypoints: places are found, moved and drawn."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import hypothesis.extra.numpy as hnp
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+
+from anyview.runtime.errors import AnyviewError
+from anyview.seeds import stream
+from anyview.training.augmentation import mirror
+from anyview.training.common.fit import fit
+from anyview.training.translator import TranslatorObjective
+from anyview.translator.keypoints import KEYPOINTS, KeypointTranslator, _strokes, place_loss
+from anyview.translator.losses import Marks
+from anyview.translator.weights import load_translator
+from anyview.video.marks import write_marks
+from anyview.video.pixels import to_input
+from tests.training.discworld import SIZE, disc_marks
+
+
+@pytest.fixture
+def model() -> KeypointTranslator:
+    torch.manual_seed(3)
+    return KeypointTranslator(16).eval()
+
+
+def frames(count: int, size: int = 16) -> torch.Tensor:
+    return torch.rand(count, 3, size, size, generator=torch.Generator().manual_seed(5)) * 2 - 1
+
+
+def test_one_context_serves_a_clip_and_several_serve_in_turn(model):
+    contexts, clip = frames(2), frames(6)
+    with torch.no_grad():
+        z1 = model.encode_expert(clip)
+        z2, skips = model.encode_context(contexts)
+        z3 = model.translate(z1, z2.repeat(3, 1), model.embed_task(z1))
+        both = model.decode(z3, skips)
+        for row in range(6):
+            alone_z2, alone = model.encode_context(contexts[row % 2 : row % 2 + 1])
+            alone_z3 = model.translate(z1[row : row + 1], alone_z2, model.embed_task(z1))
+            torch.testing.assert_close(model.decode(alone_z3, alone)[0], both[row], atol=1e-4, rtol=1e-4)
+
+
+def test_at_first_the_context_is_copied_more_than_painted_over(model):
+    contexts = frames(4)
+    with torch.no_grad():
+        z2, skips = model.encode_context(contexts)
+        made = model.decode(z2, skips)
+    noise = contexts.flip(0)
+    assert (made - contexts).square().mean() < 0.3 * (noise - contexts).square().mean()
+
+
+@settings(max_examples=15, deadline=None)
+@given(hnp.arrays(np.float32, (1, KEYPOINTS, 2), elements=st.floats(-1.25, 1.25, width=32)))
+def test_strokes_are_gaussians_around_places_and_lines(places):
+    """Against the distance of each pixel's centre from a point, or from a dense row of points."""
+    made = _strokes(torch.from_numpy(places), torch.zeros(1, 1, 12, 12))[0].numpy()
+    centres = (2 * np.arange(12) + 1) / 12 - 1
+    pixels = np.stack(np.meshgrid(centres, centres), -1)
+    lines = [a + (b - a) * np.linspace(0, 1, 400)[:, None] for a, b in pairwise(places[0])]
+    for points, stroke in zip([*places[0][:, None], *lines], made, strict=True):
+        gap = np.linalg.norm(pixels[:, :, None] - points, axis=-1).min(axis=-1) * 6  # in pixels of the map
+        np.testing.assert_allclose(stroke, np.exp(-(gap**2) / 2), atol=0.01)
+
+
+@settings(max_examples=30, deadline=None)
+@given(hnp.arrays(np.float32, (4, 3, 2), elements=st.floats(-1, 1, width=32)))
+def test_the_loss_of_places_is_their_mean_squared_distance(marks):
+    places = np.linspace(-0.9, 0.9, 4 * 2 * KEYPOINTS, dtype=np.float32).reshape(4, KEYPOINTS, 2)
+    codes = torch.from_numpy(np.concatenate((places.reshape(4, -1), np.ones((4, 32), np.float32)), 1))
+    expected = np.mean([np.sum((places[n, m] - marks[n, m]) ** 2) for n in range(4) for m in range(3)])
+    assert float(place_loss(codes, torch.from_numpy(marks))) == pytest.approx(expected, rel=1e-4, abs=1e-6)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 1000), hnp.arrays(int, (9, 2), elements=st.integers(0, 15)))
+def test_marks_are_mirrored_with_their_pictures(seed, pixels):
+    """A white pixel at each mark is still at it afterwards, whichever clips were mirrored."""
+    pictures = torch.zeros(9, 3, 16, 16)
+    for picture, (x, y) in zip(pictures, pixels, strict=True):
+        picture[:, y, x] = 1
+    marks = torch.from_numpy((2 * pixels[:, None] + 1) / 16 - 1).float()
+    made = mirror(
+        pictures[:6], pictures[6:], pictures[:3, None], Marks(marks[:6], marks[6:]), stream(seed, "x")
+    )
+    paired, context, clip, (paired_marks, context_marks) = made
+    for picture, mark in zip(
+        torch.cat((paired, context)), torch.cat((paired_marks, context_marks)), strict=True
+    ):
+        x, y = ((mark[0] + 1) * 8 - 0.5).round().int().tolist()
+        assert picture[0, y, x] == 1
+    assert torch.equal(clip[:, 0], paired[:3])
+
+
+def test_it_learns_where_things_go_and_draws_them_there(make_objective, discs, pipeline):
+    """On held-out clips the disc's keypoint ends up where the disc does, and the picture follows."""
+    marked = replace(discs, marks=disc_marks(len(discs.frames)))
+    write_marks(pipeline / "data/clips/diverse", marked.marks)
+    small = make_objective(
+        architecture="keypoint",
+        weights={"reconstruction": 0.0, "alignment": 0.0, "places": 1.0},
+        mirror=True,
+        iterations=240,
+        validation_every=240,
+        batch_size=16,
+        learning_rate=0.003,
+        schedule="cosine",
+    )
+    fit("discs", TranslatorObjective(small.cell, small.training, 1, marked), pipeline / "model")
+    model = load_translator(pipeline / "model")
+    source, *targets = discs.split("validation")
+    off, copied, lost = [], [], []
+    with torch.no_grad():
+        z1 = model.encode_expert(to_input(discs.frames[source]))
+        for target in targets:
+            true = to_input(discs.frames[target])
+            z2, skips = model.encode_context(true[:1])
+            z3 = model.translate(z1, z2, model.embed_task(z1))
+            found = ((z3[:, :2] + 1) * SIZE / 2 - 0.5).numpy()
+            place = marked.marks[target, :, 0]
+            off.append(np.linalg.norm(found - place, axis=1).mean())
+            copied.append(np.linalg.norm(place[0] - place, axis=1).mean())
+            made = model.decode(z3, skips)
+            lost.append(float((made - true).square().mean() / (true[:1] - true).square().mean()))
+    assert np.mean(off) < 0.5 * np.mean(copied)
+    assert np.mean(lost) < 0.8
+
+
+def test_an_impossible_size_is_refused():
+    with pytest.raises(AnyviewError, match=r"keypoint: .* multiple of 8"):
+        KeypointTranslator(20)
