@@ -20,7 +20,7 @@ from anyview.analysis.statistics import bootstrap_interval
 from anyview.config import Params, load_params
 from anyview.evaluation.runs import explore
 from anyview.learners.trpo import TRPO
-from anyview.pusher.batch import ACTION_SIZE, ACTIONS, OBSERVATION_SIZE, TOLERANCE, PusherBatch
+from anyview.pusher.batch import ACTION_SIZE, ACTIONS, PusherBatch, observation_size
 from anyview.pusher.contexts import Context, sample_contexts
 from anyview.pusher.episodes import episode
 from anyview.pusher.expert import roll_out
@@ -60,11 +60,16 @@ def shared_context(method: str, episodes: int) -> None:
     copies = params.imitation.trpo.batch_episodes
     contexts, _ = sample_contexts(stream(params.base.seed, "tuning"), RUNS)
     expert, _ = roll_out(contexts)
-    camera = renderer(params.sim.image_size)
+    camera = renderer("push", params.sim.image_size)
     clips = np.stack([camera.render_clip(*each) for each in zip(contexts, expert, strict=True)])
     reward = make_reward(method, params, contexts, clips)
     learner = TRPO(
-        params.imitation.trpo, params.base.seed, range(RUNS), OBSERVATION_SIZE, ACTION_SIZE, ACTIONS
+        params.imitation.trpo,
+        params.base.seed,
+        range(RUNS),
+        observation_size("push", 1),
+        ACTION_SIZE,
+        ACTIONS,
     )
     control, size = params.sim.control, params.sim.image_size
     acting = PusherBatch([context for context in contexts for _ in range(copies)], control, size)
@@ -86,7 +91,7 @@ def shared_context(method: str, episodes: int) -> None:
                 f"{batch * copies:10}{np.median(after[0]):14.3f}{np.median(after[1]):16.3f}  {told}",
                 flush=True,
             )
-    print(f"success: {int((after[1] < TOLERANCE).sum())} of {RUNS} runs")
+    print(f"success: {int((after[1] < 0.02).sum())} of {RUNS} runs")
     for name, one, other in zip(("distance from the expert's", "final distance"), before, after, strict=True):
         low, high = bootstrap_interval(one - other, np.mean, stream(0, "benchmark", 1))
         better = int((other < one).sum())

@@ -96,9 +96,9 @@ def test_bystanders_push_the_object_away_from_where_it_lies_and_from_where_the_e
     clips = tpil.wrong_pushes(contexts, np.random.default_rng(0), 64)
     assert clips.shape == (12, 50, 64, 64, 3)
     positions, _ = roll_out(contexts)
-    expert = renderer(64).render(contexts, positions[:, -1])
+    expert = renderer("push", 64).render(contexts, positions[:, -1])
     start, end, goal = map(blue_centre, (clips[:, 0], clips[:, -1], expert))
-    np.testing.assert_array_equal(clips[:, 0], renderer(64).render(contexts, positions[:, 0]))
+    np.testing.assert_array_equal(clips[:, 0], renderer("push", 64).render(contexts, positions[:, 0]))
     assert np.linalg.norm(end - start, axis=-1).min() > 2  # pixels
     assert np.median(np.linalg.norm(end - goal, axis=-1)) > 6
 

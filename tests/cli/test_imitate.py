@@ -96,7 +96,9 @@ def folder(tmp_path_factory, root: Path, translator, contexts, expert_clips) -> 
 
 def filmed(contexts: list[Context]) -> np.ndarray:
     positions, _ = roll_out(contexts)
-    return np.stack([renderer(SIZE).render_clip(*each) for each in zip(contexts, positions, strict=True)])
+    return np.stack(
+        [renderer("push", SIZE).render_clip(*each) for each in zip(contexts, positions, strict=True)]
+    )
 
 
 def test_a_video_of_ones_own_becomes_a_policy(folder, expert_clips):

@@ -139,11 +139,11 @@ def wrong_pushes(contexts: Sequence[Context], rng: np.random.Generator, image_si
 
     Where the arm does not reach one, the push ends on the way.
     """
-    others, _ = sample_contexts(rng, len(contexts))
+    others, _ = sample_contexts(rng, len(contexts), task=contexts[0].task)
     positions, _ = roll_out(
         [replace(context, goal_xy=other.goal_xy) for context, other in zip(contexts, others, strict=True)]
     )
-    camera = renderer(image_size)
+    camera = renderer(contexts[0].task, image_size)
     return np.stack([camera.render_clip(*each) for each in zip(contexts, positions, strict=True)])
 
 

@@ -15,8 +15,9 @@ from anyview.evaluation.runs import evaluate_group
 from anyview.evaluation.stage import RATE, draw_contexts
 from anyview.learners import ddpg
 from anyview.learners.common.policies import save_policies
-from anyview.pusher.batch import FRAMES, TOLERANCE
+from anyview.pusher.batch import FRAMES
 from anyview.pusher.contexts import COLOURS, Colour, Context
+from anyview.pusher.task import load_task
 from anyview.rewards.cells import make_reward
 from anyview.runtime.errors import AnyviewError
 from anyview.runtime.outputs import whole_folder, write_atomically
@@ -44,16 +45,17 @@ class Task:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Metres from where the object ends to each goal, by colour."""
+    """Metres that are left to each goal, by colour; less than ``tolerance`` is a success."""
 
     distances: dict[Colour, float]
     shown: Colour | None
+    tolerance: float
 
     @property
     def success(self) -> bool | None:
         """Whether the agent did it; None where there are two goals and nothing says which was meant."""
         goals = [self.shown] if self.shown else list(self.distances)
-        return self.distances[goals[0]] < TOLERANCE if len(goals) == 1 else None
+        return self.distances[goals[0]] < self.tolerance if len(goals) == 1 else None
 
     def __str__(self) -> str:
         told = " and ".join(
@@ -121,12 +123,12 @@ def train(task: Task, output: Path) -> Outcome:
         write_atomically(folder / "curve.csv", result.curve.to_csv(index=False))
         write_video(folder / VIDEO, views.repeat(scale, axis=1).repeat(scale, axis=2), RATE, "AV1")
     shutil.rmtree(scratch)
-    ended = result.runs.iloc[0]
+    ended, tolerance = result.runs.iloc[0], load_task(context.task).tolerance
     if context.choice is None:
-        return Outcome({COLOURS[0]: float(ended["final_distance"])}, None)
+        return Outcome({COLOURS[0]: float(ended["final_distance"])}, None, tolerance)
     counted = context.choice.colour
     names = {True: "final_distance", False: "other_distance"}
-    return Outcome({each: float(ended[names[each == counted]]) for each in COLOURS}, task.shown)
+    return Outcome({each: float(ended[names[each == counted]]) for each in COLOURS}, task.shown, tolerance)
 
 
 def _fitting_model(params: Params, dataset: str) -> Path:

@@ -23,7 +23,7 @@ def watch(
 ) -> None:
     """Watch a trained policy act, seen from its own camera."""
     from anyview.learners.common.policies import load_policy
-    from anyview.pusher.batch import TOLERANCE, PusherBatch
+    from anyview.pusher.batch import PusherBatch
     from anyview.pusher.episodes import film
     from anyview.runtime.errors import AnyviewError
     from anyview.sharing.checksums import find_policies
@@ -38,9 +38,9 @@ def watch(
     frames = film(pusher, lambda now: policy.act(now.observations[0])[None])[0]
     write_video(output, frames, 10.0, CODECS[output.suffix])
     distance = float(pusher.distance()[0])
-    success = distance < TOLERANCE
+    success = distance < pusher.task.tolerance
     if as_json:
         print(json.dumps({"output": str(output), "final_distance": distance, "success": success}))
         return
     verdict = "success" if success else "no success"
-    print(f"{output}: {cell} run {run} leaves the object {100 * distance:.1f} cm from the goal: {verdict}")
+    print(f"{output}: {cell} run {run} ends {100 * distance:.1f} cm from the goal: {verdict}")

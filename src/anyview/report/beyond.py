@@ -12,11 +12,13 @@ from anyview.analysis.cells import label
 from anyview.analysis.choice import CHOICE, choosing
 from anyview.analysis.clips import curves
 from anyview.analysis.study import EvaluatedMethod, SimulatedSet, Study
+from anyview.analysis.tasks import by_task
 from anyview.report.figures import choice, clips
 from anyview.report.figures.style import to_svg
 from anyview.report.formatting import centimetres
 from anyview.report.illustrations import Illustrations, typical_strip
 from anyview.report.pictures import Clip, Strip, animated_webp, label_view, make_clip, make_strip
+from anyview.report.tasks import task_rollouts, task_strips
 from anyview.report.text import by_cell, environment
 
 _CONTEXTS = 4
@@ -34,8 +36,10 @@ def illustrate_beyond(study: Study, results: BeyondResults) -> Illustrations:
         both = shown_twice(study.methods[CHOICE], study.simulated[CHOICE])
         strips["two-clips"] = two_clips(both)
         moving["clip-decides"] = clip_decides(both)
-    rollouts = dict(_rollouts(study))
-    return Illustrations(figures, strips, {"rollouts": rollouts} if rollouts else {}, moving)
+    strips |= dict(task_strips(study))
+    players = {"rollouts": dict(_rollouts(study)), "task-rollouts": dict(task_rollouts(study))}
+    shown = {name: titled for name, titled in players.items() if titled}
+    return Illustrations(figures, strips, shown, moving)
 
 
 class Shown(NamedTuple):
@@ -106,6 +110,8 @@ def write_beyond(
             clips=by_cell(results.clips),
             frames_of=partial(_frames_of, study),
             imitation=by_cell(results.others.imitation),
+            tasks={task: list(methods) for task, methods in by_task(study).items()},
+            outcomes=by_cell(results.tasks),
             differences=list(results.others.differences.itertuples()),
         )
     )

@@ -8,7 +8,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from anyview.analysis.estimates import Estimate, Estimator, proportion
 from anyview.analysis.study import EvaluatedMethod
-from anyview.pusher.batch import TOLERANCE
+from anyview.pusher.task import PUSH, load_task
 from anyview.review.results import flat
 from anyview.sharing.checksums import CARD
 from anyview.sharing.folder import Lock
@@ -59,7 +59,7 @@ def write_card(
         runs=len(runs),
         run=run,
         filmed=100 * runs.set_index("run")["final_distance"][run],
-        tolerance=100 * TOLERANCE,
+        tolerance=100 * load_task(PUSH).tolerance,
         metrics=metrics,
         params={key: json.dumps(value) for key, value in params.items()},
         licence=licence,
