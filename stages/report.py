@@ -53,6 +53,8 @@ def write_report(output: Path, study: Study, illustrations: Illustrations, write
         (folder / "figures").mkdir()
         for name, svg in illustrations.figures.items():
             (folder / "figures" / f"{name}.svg").write_text(svg, encoding="utf-8")
+        for name, content in illustrations.moving.items():
+            (folder / "figures" / f"{name}.webp").write_bytes(content)
         (folder / "index.html").write_text(page, encoding="utf-8")
         (folder / "report.md").write_text(text, encoding="utf-8")
     print(f"report: {output / 'index.html'}")

@@ -13,7 +13,7 @@ import pytest
 from anyview.analysis.study import EvaluatedMethod
 from anyview.config import Params, load_params
 from anyview.video.files import write_video
-from anyview.video.sets import write_shard
+from anyview.video.sets import write_set, write_shard
 
 ROOT = Path(__file__).parents[1]
 RUNS = 15
@@ -53,11 +53,11 @@ class Data:
         clips = [f"{kind}-{index:04d}" for index in range(count)]
         shards = np.arange(count) // 20
         rows = {"clip": clips, "shard": shards, "position": np.arange(count) % 20}
-        self._csv(folder / "manifest.csv", **rows, success=[index != 3 for index in range(count)])
         stored = [
             write_shard(folder, shard, np.stack([clip(50, n, 2) for n in range(20)])) for shard in set(shards)
         ]
-        self._csv(folder / "files.csv", file=[each.file for each in stored], frames=[50] * len(stored))
+        rows["success"] = [index != 3 for index in range(count)]
+        write_set(folder, pd.DataFrame(rows), stored)
         self._json(folder / "summary.json", demos=count, expert_success=0.975, acceptance=0.4)
 
     def real_clips(self) -> None:
@@ -175,18 +175,18 @@ def whole_study(root: Path) -> None:
         data.policies(cell, distances.get(cell, 0.03 + 0.01 * index), returns=not learned, blind=learned)
 
 
-def run_report(root: Path) -> subprocess.CompletedProcess:
+def run_report(root: Path, *arguments: str) -> subprocess.CompletedProcess:
     """Run the report stage in ``root`` as DVC would, with the repository's own params and pipeline."""
     (root / "stages").mkdir(exist_ok=True)
-    for name in ("params.yaml", "dvc.yaml"):
-        shutil.copy(ROOT / name, root / name)
-    command = [sys.executable, ROOT / "stages/report.py"]
+    shutil.copy(ROOT / "params.yaml", root)
+    shutil.copy(ROOT.joinpath(*arguments, "dvc.yaml"), root)
+    command = [sys.executable, ROOT / "stages/report.py", *arguments]
     return subprocess.run(command, cwd=root, capture_output=True, text=True)
 
 
 @pytest.fixture(scope="session")
 def report():
-    """``report(root)`` runs the stage in ``root``."""
+    """``report(root)`` runs the stage in ``root``, ``report(root, "beyond")`` that of beyond/."""
     return run_report
 
 

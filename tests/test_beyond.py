@@ -2,9 +2,11 @@
 
 import json
 
+import pandas as pd
 import pytest
 
 from anyview.config import load_params
+from anyview.learners.common.policies import load_policy
 from tests.conftest import Study
 
 pytestmark = pytest.mark.slow
@@ -34,3 +36,18 @@ def test_metrics_and_page_tell_of_every_cell(beyond):
     for cell in cells:
         assert f'"{cell}"' in json.dumps(metrics), cell
     assert page.count("<img") >= 2
+    assert (beyond.folder / "data/beyond/figures/clip-decides.webp").read_bytes()[8:12] == b"WEBP"
+
+
+def test_each_context_is_run_for_both_goals_and_no_evaluation_sees_tuning_contexts(beyond):
+    folder = beyond.folder / "data/policies"
+    for cell in ("choice", "choice-one-clip", "choice-clock"):
+        runs = pd.read_csv(folder / cell / "runs.csv")
+        assert list(runs["context"]) == [0, 1, 0, 1]
+        assert list(runs["choice"]) == ["red", "red", "green", "green"]
+        first, second = (load_policy(folder / cell, run).context for run in (0, 2))
+        assert first.choosing("green") == second
+    contexts = {
+        cell: load_policy(folder / cell, 0).context for cell in ("ours", "clock", "clips-1", "clips-20")
+    }
+    assert contexts["ours"] == contexts["clock"] != contexts["clips-1"] == contexts["clips-20"]

@@ -281,6 +281,23 @@ class RewardWeights(Block):
         return self
 
 
+class Incomplete(Block):
+    """Clips that lack frames. The reward is given only at the steps of which there is a frame."""
+
+    every: Annotated[int, Field(ge=1, le=49)] = Field(
+        default=1, description="n where every n-th frame is there, from the first on"
+    )
+    until: Annotated[float, Field(gt=0, le=1)] = Field(
+        default=1.0, description="the part of the clip, from its start, after which there is none"
+    )
+
+    @model_validator(mode="after")
+    def _some_frame(self) -> "Incomplete":
+        if self.every > 49 * self.until:
+            raise ValueError("no frame but the first would be left")
+        return self
+
+
 class DemonstrationCell(Block):
     """One method rewarded by a demonstration in the agent's own view (equations 20 to 22)."""
 
@@ -292,6 +309,10 @@ class DemonstrationCell(Block):
     model: str = Field(description="the translator: a cell of `translators`")
     weights: RewardWeights
     time_power: NonNegative = Field(description="reward at step t is weighted by (t/49) to this power")
+    incomplete: Incomplete = Field(
+        default=Incomplete(),
+        description="which frames there are: every n-th (`every`), up to a part of the clip (`until`)",
+    )
 
 
 class EmbeddingRewardCell(Block):
@@ -345,6 +366,12 @@ class BeyondCell(DemonstrationCell):
     )
     demonstrations: Count = Field(
         description="clips that are imitated, of each choice; of a `clock`, training clips that it averages"
+    )
+    own_clips: bool = Field(
+        default=False, description="every context imitates clips of its own, not all of them the same"
+    )
+    contexts: Literal["evaluation", "tuning"] = Field(
+        default="evaluation", description="the random stream that the contexts are drawn from"
     )
 
 

@@ -7,7 +7,18 @@ from pathlib import Path
 
 import pytest
 
-COMMANDS = ["doctor", "profile", "record", "clips", "translate", "watch", "review", "sweep", "clean"]
+COMMANDS = [
+    "doctor",
+    "profile",
+    "record",
+    "clips",
+    "translate",
+    "imitate",
+    "watch",
+    "review",
+    "sweep",
+    "clean",
+]
 
 
 @pytest.fixture

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import pandas as pd
 import pytest
 import torch
 
@@ -19,6 +20,7 @@ from anyview.runtime.errors import AnyviewError
 from anyview.translator.network import ContextTranslator
 from anyview.translator.weights import load_translator, save_translator
 from anyview.video.files import read_video, write_video
+from anyview.video.sets import write_clips, write_set
 from tests.training.discworld import disc_clips
 
 
@@ -57,7 +59,8 @@ def test_translating_a_clip_of_ones_own(footage):
 
 def test_bad_footage_is_refused_in_one_line(footage):
     ended = anyview_translate("absent.avi", "-o", "out.avi")
-    assert (ended.returncode, ended.stderr) == (2, "error: absent.avi: no such file\n")
+    complaint = "error: absent.avi: no such file, and no clip of a set in data/clips\n"
+    assert (ended.returncode, ended.stderr) == (2, complaint)
 
 
 def test_a_view_that_claims_a_giant_picture_is_refused(tmp_path):
@@ -86,7 +89,19 @@ def test_a_damaged_view_is_refused(tmp_path, suffix):
 
 def test_wide_clips_are_cut_to_their_middle_and_a_clip_may_be_the_context(footage):
     for clip, context, output in (("clip.avi", "view.png", "a.avi"), ("wide.avi", "view.avi", "b.avi")):
-        translate(Path(clip), Path(context), Path("mine"), Path(output))
+        translate(clip, Path(context), Path("mine"), Path(output))
+    assert np.array_equal(read_video(Path("a.avi")), read_video(Path("b.avi")))
+
+
+def test_a_clip_of_a_set_is_called_by_its_name(footage):
+    clips = disc_clips(2, length=9)
+    folder = Path("data/clips/discs")
+    folder.mkdir(parents=True)
+    write_set(
+        folder, pd.DataFrame({"clip": ["one", "two"]}), [write_clips(folder / "shard-0000.avi", clips, 15.0)]
+    )
+    for clip, output in (("clip.avi", "a.avi"), ("one", "b.avi")):
+        translate(clip, Path("view.png"), Path("mine"), Path(output))
     assert np.array_equal(read_video(Path("a.avi")), read_video(Path("b.avi")))
 
 
@@ -112,5 +127,5 @@ def test_what_is_wrong_is_named(footage, changed):
     Path("cut.avi").write_bytes(content[: len(content) // 2])
     given = {"clip": "clip.avi", "context": "view.png", "model": "mine", "output": "out.avi"} | changed
     with pytest.raises(AnyviewError, match=next(iter(changed.values()))):
-        translate(**{name: Path(value) for name, value in given.items()})
+        translate(given.pop("clip"), **{name: Path(value) for name, value in given.items()})
     assert not Path("out.avi").exists()

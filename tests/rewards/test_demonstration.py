@@ -4,15 +4,17 @@ import numpy as np
 import pytest
 import torch
 
-from anyview.config import RewardWeights
+from anyview.config import Incomplete, RewardWeights
 from anyview.rewards.demonstration import (
     DemonstrationReward,
+    frames_there,
+    hold,
     translate_clock,
     translate_demonstrations,
     true_demonstrations,
 )
 from anyview.translator.network import ContextTranslator
-from anyview.video.pixels import to_input
+from anyview.video.pixels import to_frames, to_input
 
 
 def literal(
@@ -137,3 +139,55 @@ def test_a_task_embedding_is_of_the_whole_clip(expert_clips, task_embedding: boo
     clips[:, 40:] = expert_clips[1, 40:]
     after, _ = translate_demonstrations(model, clips, first)
     assert torch.equal(before[:, 5], after[:, 5]) != task_embedding
+
+
+def test_each_agent_may_have_clips_of_its_own(translator, expert_clips) -> None:
+    own = np.stack([expert_clips[:2], expert_clips[1:3]])
+    together = translate_demonstrations(translator, own, expert_clips[3:, 0])
+    for run in range(2):
+        alone = translate_demonstrations(translator, own[run], expert_clips[3 + run : 4 + run, 0])
+        for one, many in zip(alone, together, strict=True):
+            assert torch.equal(one[0], many[run])
+
+
+@pytest.mark.parametrize(
+    ("incomplete", "steps"),
+    [
+        ({}, range(50)),
+        ({"every": 12}, [0, 12, 24, 36, 48]),
+        ({"every": 48}, [0, 48]),
+        ({"until": 0.67}, range(33)),
+        ({"every": 7, "until": 0.5}, [0, 7, 14, 21]),
+    ],
+)
+def test_frames_of_a_clip_that_there_are(incomplete, steps) -> None:
+    assert list(np.flatnonzero(frames_there(50, Incomplete(**incomplete)))) == list(steps)
+
+
+def test_incomplete_clips_reward_only_where_a_frame_is(translator, expert_clips) -> None:
+    """What the missing frames show is in no target and no reward; standing still earns as ever."""
+    there = frames_there(50, Incomplete(every=12))
+    clips, first = expert_clips[:2], expert_clips[3:, 0]
+    other = clips.copy()
+    other[:, ~there] = np.random.default_rng(0).integers(0, 256, other[:, ~there].shape)
+    weights = RewardWeights(feature=1.0, image=0.7)
+    rewards = [
+        DemonstrationReward(
+            translator,
+            *translate_demonstrations(translator, hold(shown, there), first),
+            first,
+            weights,
+            1.0,
+            there,
+        )
+        for shown in (clips, other)
+    ]
+    complete = translate_demonstrations(translator, clips, first)
+    np.testing.assert_array_equal(rewards[0].targets()[:, 24], to_frames(complete[1])[:, 23])
+    np.testing.assert_array_equal(rewards[0].targets(), rewards[1].targets())
+    seen = expert_clips[3:, None]
+    given = np.stack([[reward.step(seen[:, :, t], t)[:, 0] for t in range(1, 50)] for reward in rewards])
+    np.testing.assert_array_equal(given[0], given[1])
+    assert ((given[0] != 0).all(axis=1) == there[1:]).all()
+    assert (given[0][~there[1:]] == 0).all()
+    np.testing.assert_allclose(sum(rewards[0].step(first[:, None], t) for t in range(1, 50)), -49, rtol=1e-4)

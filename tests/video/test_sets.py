@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from anyview.runtime.errors import AnyviewError
 from anyview.seeds import stream
 from anyview.video.files import read_video, write_video
-from anyview.video.sets import open_frames, write_set, write_shard
+from anyview.video.sets import open_frames, read_stored, write_set, write_shard
 
 
 def noise(*shape: int) -> np.ndarray:
@@ -56,6 +56,25 @@ def test_a_set_reads_back_in_manifest_order_and_read_only(tmp_path):
     assert list(store.manifest["clip"]) == ["000", "001", "002", "003", "004", "005"]
     with pytest.raises(ValueError, match="read-only"):
         store.frames[0] = 0
+
+
+def test_a_clip_alone_is_read_from_its_own_file(tmp_path):
+    clips = make_set(tmp_path / "set")
+    (tmp_path / "set/shard-0000.avi").unlink()
+    for index in range(2, 6):
+        frames, rate = read_stored(tmp_path / "set", f"{index:03d}")
+        np.testing.assert_array_equal(frames, clips[index])
+        assert rate == 10.0
+    for clip, complaint in (
+        ("000", "shard-0000.avi: missing"),
+        ("006", "manifest.csv: it lists no clip 006"),
+    ):
+        with pytest.raises(AnyviewError, match=complaint):
+            read_stored(tmp_path / "set", clip)
+    with (tmp_path / "set/shard-0001.avi").open("ab") as file:
+        file.write(b"more")
+    with pytest.raises(AnyviewError, match=r"shard-0001\.avi: cut short or altered"):
+        read_stored(tmp_path / "set", "002")
 
 
 def test_one_or_two_workers_decode_the_same_bytes(tmp_path, monkeypatch):

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import pandas as pd
 
 from anyview.analysis.choice import against_choice, choices, choosing
+from anyview.analysis.clips import by_clips, tuning
 from anyview.analysis.estimates import Estimator
 from anyview.analysis.metrics import Tree, details
 from anyview.analysis.results import Results, analyse
@@ -13,20 +14,26 @@ from anyview.analysis.study import Study
 
 @dataclass(frozen=True)
 class BeyondResults:
-    """``choices`` and ``against_choice``: see ``analysis.choice``; ``others``: all else, as of the thesis."""
+    """``choices`` and ``against_choice``: see ``analysis.choice``; ``clips``: see ``analysis.clips``.
+
+    ``others``: all else, as of the thesis.
+    """
 
     choices: pd.DataFrame
     against_choice: pd.DataFrame
+    clips: pd.DataFrame
     others: Results
 
 
 def analyse_beyond(study: Study) -> BeyondResults:
     """Compute every table. ``study`` was read by params ``going_beyond``."""
     estimator = Estimator(study.params.base.seed)
-    alone = {cell: method for cell, method in study.methods.items() if cell not in choosing(study.methods)}
+    elsewhere = {*choosing(study.methods), *tuning(study.params, study.methods)}
+    alone = {cell: method for cell, method in study.methods.items() if cell not in elsewhere}
     return BeyondResults(
         choices(study.methods, estimator),
         against_choice(study.methods, estimator),
+        by_clips(study.params, study.methods, estimator),
         analyse(replace(study, methods=alone)),
     )
 
@@ -37,6 +44,7 @@ def beyond_metrics(results: BeyondResults) -> Tree:
         "data": results.others.data,
         "translation": results.others.translation,
         "choice": results.choices,
+        "clips": results.clips,
         "clock": results.others.imitation,
     }
     return {name: details(table) for name, table in tables.items()}

@@ -13,6 +13,7 @@ from anyview.config import Params
 from anyview.runtime.errors import AnyviewError
 from anyview.video.files import read_video
 from anyview.video.manifests import read_table
+from anyview.video.sets import read_stored
 from anyview.video.splits import read_split
 
 LOSSES = ("loss", "translation", "reconstruction", "alignment", "psnr", "ssim")
@@ -36,11 +37,7 @@ class SimulatedSet:
 
     def frames(self, clip: str) -> np.ndarray:
         """A demonstration's frames, uint8 RGB (T, H, W, 3): its shard alone is read."""
-        row = self.manifest.set_index("clip").loc[clip]
-        stored = read_table(self.folder / "files.csv", ["file", "frames"]).iloc[int(row["shard"])]
-        shard = read_video(self.folder / stored["file"])
-        start = int(row["position"]) * int(stored["frames"])
-        return shard[start : start + int(stored["frames"])]
+        return read_stored(self.folder, clip)[0]
 
 
 @dataclass(frozen=True)
@@ -181,7 +178,7 @@ def read_study(params: Params, root: Path = Path()) -> Study:
 
 
 def _simulated(folder: Path) -> SimulatedSet:
-    manifest = read_table(folder / "manifest.csv", ["clip", "shard", "position", "success"], unique="clip")
+    manifest = read_table(folder / "manifest.csv", ["clip", "success"], unique="clip")
     return SimulatedSet(folder, manifest, float(_json(folder / "summary.json", "acceptance")["acceptance"]))
 
 

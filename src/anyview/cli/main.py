@@ -13,6 +13,7 @@ from rich.console import Console
 
 from anyview.cli.clips import clips
 from anyview.cli.export import export
+from anyview.cli.imitate import imitate
 from anyview.cli.record import record
 from anyview.cli.repro import repro
 from anyview.cli.review import review, sweep
@@ -137,6 +138,7 @@ for command in (
     clips,
     export,
     translate,
+    imitate,
     watch,
     review,
     sweep,

@@ -10,7 +10,7 @@ from anyview import paths
 
 
 def translate(
-    clip: Annotated[Path, typer.Argument(help="The expert's clip: any video.")],
+    clip: Annotated[str, typer.Argument(help="The expert's clip: any video, or the name of a set's clip.")],
     context: Annotated[
         Path,
         typer.Option("--context", help="The other view: a picture, or a video whose first frame is taken."),

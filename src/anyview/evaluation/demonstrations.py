@@ -14,7 +14,7 @@ from anyview.video.splits import read_split
 
 
 class Clips(NamedTuple):
-    """Clips of the expert: ids, and frames (m, 50, H, W, 3)."""
+    """Clips of the expert: ids, and frames (m, 50, H, W, 3), or (R, m, 50, H, W, 3) of R contexts' own."""
 
     names: list[str]
     frames: np.ndarray
@@ -27,6 +27,21 @@ def imitated_demonstrations(params: Params, choice: Colour | None = None) -> Cli
     """
     store, rows = _split_rows(params, "validation", choice)
     return _draw(params, store, rows, params.imitation.demonstrations, "imitated", f"holds out {len(rows)}")
+
+
+def own_demonstrations(params: Params, contexts: int, choice: Colour | None = None) -> Clips:
+    """As ``imitated_demonstrations``, with other clips in each of ``contexts``; ids context by context.
+
+    Fewer clips of a context are the first of more.
+    """
+    store, rows = _split_rows(params, "validation", choice)
+    _check_count(params, rows, params.imitation.demonstrations, f"holds out {len(rows)}")
+    drawn = [stream(params.base.seed, "imitated", context).permutation(rows) for context in range(contexts)]
+    chosen = np.stack(drawn)[:, : params.imitation.demonstrations]
+    frames = np.stack([store.frames[row] for row in chosen.flat])
+    return Clips(
+        list(store.manifest["clip"].iloc[chosen.flat]), frames.reshape(*chosen.shape, *frames.shape[1:])
+    )
 
 
 def clock_clips(params: Params) -> Clips:
@@ -64,11 +79,15 @@ def training_clips(params: Params) -> tuple[np.ndarray, np.ndarray, list[Context
 def _draw(
     params: Params, store: FrameStore, rows: np.ndarray, wanted: int, name: str, there_are: str
 ) -> Clips:
+    _check_count(params, rows, wanted, there_are)
+    chosen = np.sort(stream(params.base.seed, name).choice(rows, wanted, replace=False))
+    return Clips(list(store.manifest["clip"].iloc[chosen]), np.stack([store.frames[row] for row in chosen]))
+
+
+def _check_count(params: Params, rows: np.ndarray, wanted: int, there_are: str) -> None:
     if len(rows) < wanted:
         table = paths.split_table(params.imitation.dataset)
         raise AnyviewError(f"params.yaml: imitation.demonstrations: {wanted}, but {table} {there_are} clips")
-    chosen = np.sort(stream(params.base.seed, name).choice(rows, wanted, replace=False))
-    return Clips(list(store.manifest["clip"].iloc[chosen]), np.stack([store.frames[row] for row in chosen]))
 
 
 def _split_rows(params: Params, split: str, choice: Colour | None = None) -> tuple[FrameStore, np.ndarray]:

@@ -24,7 +24,10 @@ class Group:
     runs: Sequence[int]
     contexts: Sequence[Context]
     demonstrations: np.ndarray
-    """(m, 50, H, W, 3), what the agents are shown: the expert in other contexts."""
+    """(m, 50, H, W, 3), what the agents are shown: the expert in other contexts.
+
+    (R, m, 50, H, W, 3) where each run has clips of its own.
+    """
     own: np.ndarray
     """(R, 50, H, W, 3), the expert in each agent's own view: from the agent's first frame on."""
 

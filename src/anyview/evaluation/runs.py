@@ -58,7 +58,8 @@ def evaluate_group(
 ) -> Result:
     """Train and evaluate the ``runs`` of cell ``name``, one context each; continues from ``scratch``.
 
-    ``demonstrations`` (m, 50, H, W, 3) uint8 RGB are the expert's clips in other contexts.
+    ``demonstrations`` (m, 50, H, W, 3) uint8 RGB are the expert's clips in other contexts, those of each run
+    where they are (R, m, 50, H, W, 3).
     """
     use_threads(1)
     positions, _ = roll_out(contexts)
@@ -66,7 +67,7 @@ def evaluate_group(
     group = Group(params, params.methods[name], runs, contexts, demonstrations, own)
     learner = method.make_learner(params, runs, observation_size(len(contexts[0].goals)))
     scoring = method.make_reward(group)
-    label = f"{name}, runs {runs[0]} to {runs[-1]}"
+    label = f"{name}, runs {runs[0]} to {runs[-1]}" if len(runs) > 1 else name
     curve = _train(label, group, learner, scoring, Checkpoints(scratch))
 
     agent, distance, other = _perform(group, learner)

@@ -9,8 +9,14 @@ import numpy as np
 import pandas as pd
 
 from anyview import paths
-from anyview.config import Params
-from anyview.evaluation.demonstrations import Clips, clock_clips, imitated_demonstrations, two_goals
+from anyview.config import BeyondCell, Params
+from anyview.evaluation.demonstrations import (
+    Clips,
+    clock_clips,
+    imitated_demonstrations,
+    own_demonstrations,
+    two_goals,
+)
 from anyview.evaluation.methods import Method
 from anyview.evaluation.runs import evaluate_group, groups_of
 from anyview.learners.common.policies import save_policies
@@ -33,12 +39,14 @@ def evaluate_method(name: str, params: Params, method: Method, sources: Sequence
     - ``curve.csv``: the learning curve of each run;
     - ``policy-<run>.safetensors`` and ``policy.json``: see ``learners.common.policies``;
     - ``rollouts/run-<run>.avi``: the agent's frames with the imitated demonstration to their right;
-    - ``demonstrations.csv``: the clips that are imitated.
+    - ``demonstrations.csv``: the clips that are imitated, with their ``context`` if each has its own.
 
     Where the demonstrations choose between two goals, every context is run twice: first all of them with
     clips of the one choice, then all with clips of the other. ``runs.csv`` has the columns ``context`` and
     ``choice`` then, and ``demonstrations.csv`` has ``choice``.
     """
+    cell = params.methods[name]
+    own = isinstance(cell, BeyondCell) and cell.own_clips
     imitated = _imitated(name, params)
     numbers = groups_of(params.imitation.runs, params.imitation.group)
     values, files = _origin(name, params, sources)
@@ -50,9 +58,13 @@ def evaluate_method(name: str, params: Params, method: Method, sources: Sequence
             runs = [len(acted) + run for run in group]
             scratch = checkpoint_folder([*values, len(tasks)], files)
             theirs = [contexts[run] for run in group]
-            tasks.append((name, params, method, runs, theirs, clips.frames, scratch))
+            frames = clips.frames[group] if own else clips.frames
+            tasks.append((name, params, method, runs, theirs, frames, scratch))
         acted += contexts
-        shown.append(pd.DataFrame({"clip": clips.names} | ({"choice": choice} if choice else {})))
+        table = pd.DataFrame({"clip": clips.names} | ({"choice": choice} if choice else {}))
+        if own:
+            table["context"] = np.repeat(np.arange(len(contexts)), params.imitation.demonstrations)
+        shown.append(table)
     results = list(run_tasks(evaluate_group, tasks))
     runs = pd.concat([result.runs for result in results], ignore_index=True)
     curve = pd.concat([result.curve for result in results], ignore_index=True)
@@ -78,17 +90,26 @@ def evaluate_method(name: str, params: Params, method: Method, sources: Sequence
     print(f"{name}: {runs['success'].sum()} of {len(runs)} succeed; median distance {distance:.1f} cm")
 
 
+def draw_contexts(params: Params, name: str, count: int) -> list[Context]:
+    """``count`` contexts to act in, with as many goals as the clips have, from the random stream ``name``."""
+    kind: Kind = "choice" if two_goals(params) else "diverse"
+    rng = stream(params.base.seed, name if kind == "diverse" else f"{name}/{kind}")
+    return sample_contexts(rng, count, kind)[0]
+
+
 def _imitated(name: str, params: Params) -> list[tuple[Colour | None, list[Context], Clips]]:
     """For each choice, or the only task: the contexts to act in and the clips that are imitated there."""
-    kind: Kind = "choice" if two_goals(params) else "diverse"
-    rng = stream(params.base.seed, "evaluation" if kind == "diverse" else f"evaluation/{kind}")
-    contexts, _ = sample_contexts(rng, params.imitation.runs, kind)
+    cell = params.methods[name]
+    beyond = cell if isinstance(cell, BeyondCell) else None
+    contexts = draw_contexts(params, beyond.contexts if beyond else "evaluation", params.imitation.runs)
 
     def clips(choice: Colour | None = None) -> Clips:
-        clock = params.methods[name].reward == "clock"
+        if beyond and beyond.own_clips:
+            return own_demonstrations(params, len(contexts), choice)
+        clock = cell.reward == "clock"
         return clock_clips(params) if clock else imitated_demonstrations(params, choice)
 
-    if kind == "diverse":
+    if not two_goals(params):
         return [(None, contexts, clips())]
     return [(choice, [context.choosing(choice) for context in contexts], clips(choice)) for choice in COLOURS]
 

@@ -2,51 +2,90 @@
 
 import re
 from collections.abc import Callable, Iterator
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from anyview.analysis.beyond import BeyondResults
 from anyview.analysis.cells import label
 from anyview.analysis.choice import CHOICE, choosing
+from anyview.analysis.clips import curves
 from anyview.analysis.study import EvaluatedMethod, SimulatedSet, Study
-from anyview.report.figures import choice
+from anyview.report.figures import choice, clips
 from anyview.report.figures.style import to_svg
 from anyview.report.formatting import centimetres
 from anyview.report.illustrations import Illustrations, typical_strip
-from anyview.report.pictures import Clip, Strip, make_clip, make_strip
+from anyview.report.pictures import Clip, Strip, animated_webp, label_view, make_clip, make_strip
 from anyview.report.text import by_cell, environment
 
 _CONTEXTS = 4
+_SCALE = 3  # of a view in the picture that moves
 
 
 def illustrate_beyond(study: Study, results: BeyondResults) -> Illustrations:
     """Draw everything."""
     figures = {"choices": to_svg(choice.choices(results.choices))} if len(results.choices) else {}
+    if len(results.clips):
+        figures["clips"] = to_svg(clips.clip_curves(results.clips, _clip_curves(study, results)))
     strips = {f"translations-{cell}": typical_strip(entry) for cell, entry in study.translators.items()}
+    moving = {}
     if CHOICE in study.methods and CHOICE in study.simulated:
-        strips["two-clips"] = two_clips(study.methods[CHOICE], study.simulated[CHOICE])
+        both = shown_twice(study.methods[CHOICE], study.simulated[CHOICE])
+        strips["two-clips"] = two_clips(both)
+        moving["clip-decides"] = clip_decides(both)
     rollouts = dict(_rollouts(study))
-    return Illustrations(figures, strips, {"rollouts": rollouts} if rollouts else {})
+    return Illustrations(figures, strips, {"rollouts": rollouts} if rollouts else {}, moving)
 
 
-def two_clips(method: EvaluatedMethod, demonstrations: SimulatedSet) -> Strip:
-    """One context under two clips: for each choice an expert's clip, its translation and the agent.
+class Shown(NamedTuple):
+    """A run of `choice`: the goal that was shown and clips (T, H, W, 3).
 
-    The context is the one of median distance to the goal that was shown, the farther of its two runs.
+    One clip of the expert's to that goal, what the translator makes of all of them, and the agent.
     """
+
+    goal: str
+    expert: np.ndarray
+    translated: np.ndarray
+    agent: np.ndarray
+
+
+def shown_twice(method: EvaluatedMethod, demonstrations: SimulatedSet) -> list[Shown]:
+    """Both runs of a context, that of median distance to the goal that was shown, the farther of the two."""
     farther = method.runs.groupby("context")["final_distance"].max().sort_values(kind="stable")
     runs = method.runs[method.runs["context"] == farther.index[len(farther) // 2]]
-    rows = []
-    for run, shown in zip(runs["run"], runs["choice"], strict=True):
-        choices = demonstrations.manifest.set_index("clip")["choice"]
-        clip = next(clip for clip in method.demonstrations if choices[clip] == shown)
+    choices = demonstrations.manifest.set_index("clip")["choice"]
+    both = []
+    for run, goal in zip(runs["run"], runs["choice"], strict=True):
+        clip = next(clip for clip in method.demonstrations if choices[clip] == goal)
         agent, translated = np.split(method.rollout(int(run)), 2, axis=2)
-        rows += [
-            (f"expert, {shown}", demonstrations.frames(clip)),
-            ("translated", translated),
-            ("agent", agent),
-        ]
+        both.append(Shown(goal, demonstrations.frames(clip), translated, agent))
+    return both
+
+
+def two_clips(both: list[Shown]) -> Strip:
+    """One context under two clips: the three rows of each."""
+    rows = []
+    for run in both:
+        rows += [(f"expert, {run.goal}", run.expert), ("translated", run.translated), ("agent", run.agent)]
     return make_strip(rows)
+
+
+def clip_decides(both: list[Shown]) -> bytes:
+    """The same as a picture that moves, animated WebP: the expert, its translation and the agent abreast."""
+    return animated_webp(
+        [
+            np.concatenate(
+                [
+                    label_view(run.expert, f"a clip: to {run.goal}", _SCALE),
+                    label_view(run.translated, "translated", _SCALE),
+                    label_view(run.agent, "the agent", _SCALE),
+                ],
+                axis=2,
+            )
+            for run in both
+        ]
+    )
 
 
 def write_beyond(
@@ -64,6 +103,8 @@ def write_beyond(
             translation=by_cell(results.others.translation),
             choices=by_cell(results.choices),
             against_choice=list(results.against_choice.itertuples()),
+            clips=by_cell(results.clips),
+            frames_of=partial(_frames_of, study),
             imitation=by_cell(results.others.imitation),
             differences=list(results.others.differences.itertuples()),
         )
@@ -71,13 +112,31 @@ def write_beyond(
     return re.sub(r"\n{3,}", "\n\n", written).strip() + "\n"
 
 
+def _clip_curves(study: Study, results: BeyondResults) -> list[tuple[str, dict[str, str]]]:
+    """The title of each curve, and how its cells are called there."""
+    cells = study.params.beyond.cells
+    by_count, by_frames = curves(study.params, results.clips)
+    named = [
+        ("clips", {cell: str(cells[cell].demonstrations) for cell in by_count}),
+        ("frames of each", {cell: _frames_of(study, cell) for cell in by_frames}),
+    ]
+    return [(title, labels) for title, labels in named if labels]
+
+
+def _frames_of(study: Study, cell: str) -> str:
+    """Which frames of its clips a method has."""
+    incomplete = study.params.beyond.cells[cell].incomplete
+    kept = "all" if incomplete.every == 1 else f"1 in {incomplete.every}"
+    return kept if incomplete.until == 1 else f"first {incomplete.until:.0%}"
+
+
 def _rollouts(study: Study) -> Iterator[tuple[str, list[Clip]]]:
     """The first contexts, each of every method and both choices."""
     for context in range(_CONTEXTS):
-        clips = []
+        players = []
         for cell, method in choosing(study.methods).items():
             for row in method.runs[method.runs["context"] == context].itertuples():
                 caption = f"{label(cell)}, {row.choice} shown: {centimetres(row.final_distance)}"
-                clips.append(make_clip(method.rollout(int(row.run)), caption))
-        if clips:
-            yield f"Context {context}", clips
+                players.append(make_clip(method.rollout(int(row.run)), caption))
+        if players:
+            yield f"Context {context}", players

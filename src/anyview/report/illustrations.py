@@ -1,7 +1,7 @@
 """What the page shows beside its text: figures, strips of stills, and clips that play."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -20,11 +20,15 @@ _RUNS = 6
 
 @dataclass(frozen=True)
 class Illustrations:
-    """By name, only what the study allows: figures as SVG text, strips, players' clips by their title."""
+    """By name, only what the study allows: figures as SVG text, strips, players' clips by their title.
+
+    ``moving`` are animated WebP files, for a page elsewhere.
+    """
 
     figures: dict[str, str]
     strips: dict[str, Strip]
     players: dict[str, dict[str, list[Clip]]]
+    moving: dict[str, bytes] = field(default_factory=dict)
 
 
 def illustrate(study: Study, results: Results) -> Illustrations:

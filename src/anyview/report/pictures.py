@@ -9,6 +9,8 @@ import numpy as np
 
 _QUALITY = 90
 _LOSSLESS = 101  # OpenCV: above 100
+_MILLISECONDS, _PAUSE = 100, 1500  # that a frame of an animation stays, and the last one
+_HEAD = 24  # pixels for the text over a view
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,30 @@ def make_clip(frames: np.ndarray, caption: str, stride: int = 2) -> Clip:
     kept = frames[list(every(frames, stride))]
     count, height, width, _ = kept.shape
     return Clip(_webp(kept.reshape(count * height, width, 3), lossless=False), count, width, height, caption)
+
+
+def label_view(frames: np.ndarray, text: str, scale: int) -> np.ndarray:
+    """``frames``, uint8 RGB (T, H, W, 3), ``scale`` times as large, under a white line that says ``text``."""
+    large = frames.repeat(scale, axis=1).repeat(scale, axis=2)
+    head = np.full((_HEAD, large.shape[2], 3), 255, np.uint8)
+    cv2.putText(head, text, (4, _HEAD - 7), cv2.FONT_HERSHEY_SIMPLEX, 0.5, (30, 30, 30), 1, cv2.LINE_AA)
+    return np.concatenate([np.broadcast_to(head, (len(large), *head.shape)), large], axis=1)
+
+
+def animated_webp(parts: Sequence[np.ndarray]) -> bytes:
+    """Clips, uint8 RGB (T, H, W, 3), one after another for ever, each at twice its speed; its end stays."""
+    pictures: list[np.ndarray] = []
+    milliseconds: list[int] = []
+    for frames in parts:
+        kept = frames[list(every(frames, 2))]
+        pictures += [cv2.cvtColor(frame, cv2.COLOR_RGB2BGR) for frame in kept]
+        milliseconds += [_MILLISECONDS] * (len(kept) - 1) + [_PAUSE]
+    animation = cv2.Animation()
+    animation.frames, animation.durations = pictures, milliseconds
+    done, content = cv2.imencodeanimation(".webp", animation, [cv2.IMWRITE_WEBP_QUALITY, _QUALITY])
+    if not done:
+        raise RuntimeError("OpenCV cannot encode WebP")
+    return content.tobytes()
 
 
 def row_uri(frames: np.ndarray) -> str:

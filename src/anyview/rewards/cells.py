@@ -11,6 +11,8 @@ from anyview.embedding.weights import load_embedding
 from anyview.evaluation.methods import Group, Scoring, first_demonstration
 from anyview.rewards.demonstration import (
     DemonstrationReward,
+    frames_there,
+    hold,
     translate_clock,
     translate_demonstrations,
     true_demonstrations,
@@ -36,12 +38,13 @@ def _demonstrated(group: Group, cell: DemonstrationCell) -> Scoring:
     """The translated demonstration's reward, or the Oracle's against the true one."""
     model = _fitting(load_translator(paths.model(cell.model)), cell.model, group.params.sim.image_size)
     first = np.ascontiguousarray(group.own[:, 0])
+    there = frames_there(group.own.shape[1], cell.incomplete)
     if cell.reward == "true":
         targets = true_demonstrations(model, group.own)
     else:
         translate = translate_clock if cell.reward == "clock" else translate_demonstrations
-        targets = translate(model, group.demonstrations, first)
-    reward = DemonstrationReward(model, *targets, first, cell.weights, cell.time_power)
+        targets = translate(model, hold(group.demonstrations, there), first)
+    reward = DemonstrationReward(model, *targets, first, cell.weights, cell.time_power, there)
     return Scoring(reward, reward.scales, reward.targets(), fixed=True)
 
 

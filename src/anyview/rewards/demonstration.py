@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from anyview.config import RewardWeights
+from anyview.config import Incomplete, RewardWeights
 from anyview.learners.common.interfaces import Arrays
 from anyview.translator.architectures import Translator
 from anyview.video.pixels import to_frames, to_input
@@ -41,13 +41,19 @@ class DemonstrationReward:
         first_frames: np.ndarray,
         weights: RewardWeights,
         time_power: float,
+        there: np.ndarray | None = None,
     ):
-        """Targets ``features`` (R, T, Z), ``images`` (R, T, 3, H, W); uint8 ``first_frames`` (R, H, W, 3)."""
+        """Targets ``features`` (R, T, Z), ``images`` (R, T, 3, H, W); uint8 ``first_frames`` (R, H, W, 3).
+
+        Where ``there`` (T + 1,) says that the clips have no frame, the reward is 0.
+        """
         device = features.device
         self._model, self._features, self._images = model, features, images
         self._first = first_frames
         steps = features.shape[1]
         self._weights = (torch.arange(1, steps + 1, device=device) / steps) ** time_power
+        if there is not None:
+            self._weights *= torch.from_numpy(there[1:]).to(device)
         first = to_input(torch.from_numpy(first_frames).to(device))
         with torch.inference_mode():
             still_features = ((model.encode_expert(first)[:, None] - features) ** 2).sum(-1)
@@ -93,14 +99,31 @@ class DemonstrationReward:
         """Nothing to restore."""
 
 
+def frames_there(length: int, incomplete: Incomplete) -> np.ndarray:
+    """Which of a clip's ``length`` frames there are: (length,) bool. The first always is."""
+    steps = np.arange(length)
+    return (steps % incomplete.every == 0) & (steps <= incomplete.until * (length - 1))
+
+
+def hold(clips: np.ndarray, there: np.ndarray) -> np.ndarray:
+    """``clips`` (..., T + 1, H, W, 3) where the last frame that is ``there`` (T + 1,) stands for the next."""
+    return clips[..., np.maximum.accumulate(np.where(there, np.arange(len(there)), 0)), :, :, :]
+
+
 @torch.inference_mode()
 def translate_demonstrations(
     model: Translator, demonstrations: np.ndarray, first_frames: np.ndarray
 ) -> tuple[Tensor, Tensor]:
     """Mean translated features (R, T, Z) and frames (R, T, 3, H, W) for each agent's first frame.
 
-    ``demonstrations`` (m, T + 1, H, W, 3) and ``first_frames`` (R, H, W, 3) are uint8.
+    ``demonstrations`` (m, T + 1, H, W, 3), or (R, m, ...) if each agent has its own, and ``first_frames``
+    (R, H, W, 3) are uint8.
     """
+    if demonstrations.ndim == 6:
+        own = zip(demonstrations, first_frames, strict=True)
+        parts = [translate_demonstrations(model, clips, first[None]) for clips, first in own]
+        features, images = zip(*parts, strict=True)
+        return torch.cat(features), torch.cat(images)
     device = next(model.parameters()).device
     clips = [_encode(model, clip[1:], device) for clip in demonstrations]
     return _translate(model, clips, first_frames, device)

@@ -16,6 +16,7 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,7 @@ from anyview.runtime.outputs import write_atomically
 from anyview.runtime.scratch import content_key, scratch_folder
 from anyview.video.files import Codec, video_frames, write_video
 from anyview.video.manifests import read_table
+from anyview.video.reading import open_video
 
 _LAYOUT = "frames-1"  # of the decoded file; part of its key
 
@@ -98,6 +100,29 @@ def open_frames(folder: Path) -> FrameStore:
         frames = _map(decoded)
     assert frames is not None
     return FrameStore(frames, manifest)
+
+
+def read_stored(folder: Path, clip: str) -> tuple[np.ndarray, float]:
+    """Frames, uint8 RGB (T, H, W, 3), and frames per second of one clip: its file alone is read, and checked.
+
+    Raises AnyviewError if the set has no such clip, or its file is missing or altered.
+    """
+    manifest = read_table(folder / "manifest.csv", ["clip"], unique="clip")
+    rows = np.flatnonzero(manifest["clip"] == clip)
+    if not len(rows):
+        raise AnyviewError(f"{folder / 'manifest.csv'}: it lists no clip {clip}")
+    place = int(rows[0])
+    for stored in _read_files(folder):
+        if place < stored.clips:
+            _check(folder, stored)
+            with open_video(folder / stored.file) as video:
+                wanted = islice(video.frames(), place * stored.frames, (place + 1) * stored.frames)
+                frames = [video.rgb(frame) for frame in wanted]
+            if len(frames) < stored.frames:
+                raise AnyviewError(f"{folder / stored.file}: fewer frames than files.csv says")
+            return np.stack(frames), video.rate
+        place -= stored.clips
+    raise AnyviewError(f"{folder / 'manifest.csv'}: it lists more clips than files.csv")
 
 
 def _read_files(folder: Path) -> list[StoredFile]:
