@@ -178,8 +178,8 @@ class TranslatorCell(Block):
     weights: LossWeights
     experts: str | None = Field(
         default=None,
-        description="set of the experts' clips: one of the rig, in which a hand does what the cell's own clips "
-        "show, or the cell's own set, as without this key",
+        description="set of the experts' clips: one of the rig, in which a hand does what the cell's own "
+        "clips show, or the cell's own set, as without this key",
     )
     pairs: Literal["any", "views"] = Field(
         default="any", description="clips to pair: `any` two, or the `views` of one demonstration"
@@ -198,7 +198,9 @@ class TranslatorCell(Block):
     @model_validator(mode="after")
     def _experts_alone(self) -> "TranslatorCell":
         if self.other_experts and (self.augment or self.pairs != "any"):
-            raise ValueError("clips of other experts are not augmented, and paired with any of the cell's own")
+            raise ValueError(
+                "clips of other experts are paired with any of the cell's own, and not augmented"
+            )
         return self
 
     @property
@@ -380,8 +382,8 @@ class BeyondCell(DemonstrationCell):
     """One method of the studies beyond the thesis, with the runs and learners of `imitation`."""
 
     dataset: str = Field(
-        description="simulated set whose task is done; where its clips choose between two goals, every context "
-        "is run twice, once for each"
+        description="simulated set whose task is done; where its clips choose between two goals, every "
+        "context is run twice, once for each"
     )
     experts: str = Field(
         description="set whose held-out clips are imitated: that of the rig's clips, or `dataset` itself"

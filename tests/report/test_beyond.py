@@ -56,7 +56,7 @@ def test_the_page_stands_alone_and_has_its_chapters(beyond):
 def test_tables_tell_of_every_cell(beyond, params):
     text = (beyond / "data/beyond/report.md").read_text(encoding="utf-8")
     tables = [block.splitlines() for block in text.split("\n\n") if block.startswith("|")]
-    assert len(tables) == 5
+    assert len(tables) == 7
     for rows in tables:
         assert {row.count(" | ") for row in rows} == {rows[0].count(" | ")}
     rows = {row.split(" | ")[0]: row for row in tables[-1]}
@@ -64,7 +64,7 @@ def test_tables_tell_of_every_cell(beyond, params):
     assert rows["| `clips-every-4`"].split(" | ")[1:3] == ["20", "1 in 4"]
     assert rows["| `clips-two-thirds`"].split(" | ")[1:3] == ["20", "first 67%"]
     metrics = json.loads((beyond / "metrics/beyond.json").read_text())
-    told = {*metrics["choice"], *metrics["clips"], *metrics["clock"]}
+    told = {*metrics["choice"], *metrics["clips"], *metrics["imitation"]}
     assert told == {*params.beyond.cells, "ours"}
     assert metrics["clips"]["clips-1"].keys() == {
         "runs",

@@ -31,7 +31,7 @@ def imitated_demonstrations(params: Params, choice: Colour | None = None) -> Cli
 
 
 def rig_demonstrations(params: Params, experts: str) -> Clips:
-    """As ``imitated_demonstrations``, of the set ``experts``: a hand's, in the time and size of the agents' clips.
+    """As ``imitated_demonstrations``, of another set ``experts``, in the time and of the size of the agents'.
 
     Raises AnyviewError where its split holds out fewer.
     """

@@ -124,6 +124,8 @@ def _origin(name: str, params: Params, sources: Sequence[Path]) -> tuple[list[An
     for block in ("imitation", "adversarial"):
         values[block]["cells"] = values[block]["cells"].get(name)
     cell = params.methods[name]
-    datasets = {params.imitation.dataset: None} | ({cell.experts: None} if isinstance(cell, BeyondCell) else {})
+    datasets = [params.imitation.dataset]
+    if isinstance(cell, BeyondCell) and cell.other_experts:
+        datasets.append(cell.other_experts)
     files = [file for dataset in datasets for file in dataset_files(dataset)]
     return [name, values], files + [file for source in sources for file in sorted(source.iterdir())]

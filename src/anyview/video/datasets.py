@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 
 from anyview import paths
-from anyview.video.phases import SECONDS, seconds_at, steps_at
 from anyview.runtime.errors import AnyviewError
 from anyview.video.marks import marks_file, read_marks
-from anyview.video.pixels import resize
+from anyview.video.phases import frames_in_step, seconds_of, steps_at
+from anyview.video.pictures import resize
 from anyview.video.sets import open_frames
 from anyview.video.splits import read_split
 
@@ -22,8 +22,8 @@ class Dataset:
 
     ``marks``, float32 (N, T, M, 2), are the places of M known things in pixels, if the set has any.
 
-    The experts' clips that are paired with the set's own are of the same set, or of the set ``experts``, whose
-    experts act in another embodiment, before another camera and in their own time.
+    The experts' clips that are paired with the set's own are of the same set, or of the set ``experts``: of
+    another body, before another camera and in its own time.
     """
 
     name: str
@@ -65,7 +65,6 @@ class Dataset:
         groups = clips.groupby("pair", sort=False).indices.values()
         return [self.split("train")[group] for group in groups if len(group) > 1]
 
-
     def expert_frames(self, clips: np.ndarray, times: np.ndarray) -> np.ndarray:
         """Frames ``times`` of the experts' ``clips``, uint8 (..., H, W, 3), of the size of the set's own."""
         if self.experts is None:
@@ -80,8 +79,7 @@ class Dataset:
         """The experts' ``clip``, uint8 (T, H, W, 3), in the time and of the size of the set's own clips."""
         if self.experts is None:
             return self.frames[clip]
-        away = self.experts.seconds[clip] - seconds_at(np.arange(self.length))[:, None]
-        return self.expert_frames(np.array(clip), np.abs(away).argmin(axis=1))
+        return self.expert_frames(np.array(clip), frames_in_step(self.experts.seconds[clip]))
 
     @cached_property
     def seconds(self) -> np.ndarray:
@@ -91,7 +89,7 @@ class Dataset:
         """
         if "times" in self.clips:
             return np.array([text.split() for text in self.clips["times"]], float)
-        return np.broadcast_to(np.arange(self.length) * (SECONDS / self.length), self.frames.shape[:2])
+        return np.broadcast_to(seconds_of(self.length), self.frames.shape[:2])
 
 
 def open_dataset(name: str, experts: str | None = None) -> Dataset:
@@ -129,8 +127,8 @@ def clip_pairs(dataset: Dataset, split: str) -> list[tuple[int, int]]:
     """(source, target) clips to evaluate a translator on: every clip of ``split`` once as the target.
 
     The source is the other view of the target's pair, or the next clip of the same choice if it has none. An
-    ``extreme`` target's source is a standard validation clip. If other experts' clips are the sources, they are
-    those of their own ``split`` in turn.
+    ``extreme`` target's source is a standard validation clip. Sources that are other experts' clips are those of
+    their own ``split`` in turn.
     """
     targets = dataset.split(split)
     if dataset.experts:

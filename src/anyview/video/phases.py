@@ -1,7 +1,7 @@
-"""The phases that all demonstrations share, approach, push and rest: when a moment of the rig comes in the simulation.
+"""The phases of every demonstration, approach, push and rest: how clips of the rig and simulated ones keep step.
 
-Both scripts follow minimum-jerk profiles within each phase, so between its ends equal parts of a phase are
-equal progress. The hand of the rig waits a little between its phases, where the simulated arm does not.
+Both scripts follow minimum-jerk profiles within a phase, so that equal parts of it are equal progress. The
+hand of the rig waits a little between its phases, where the simulated arm does not.
 """
 
 import numpy as np
@@ -14,11 +14,21 @@ _STEPS = (0, 14, 14, 42, LENGTH - 1)
 
 
 def steps_at(seconds: np.ndarray) -> np.ndarray:
-    """The simulated expert's time steps, whole numbers, at ``seconds`` of the rig's clips; of any shape."""
+    """The simulated expert's time steps, whole numbers, at ``seconds`` of a clip of the rig; of any shape."""
     return np.interp(seconds, _KNOTS, _STEPS).round().astype(int)
 
 
 def seconds_at(steps: np.ndarray) -> np.ndarray:
-    """Seconds of the rig's clips at ``steps`` of the simulated expert, the middle of what it waits."""
+    """Seconds of a clip of the rig at ``steps`` of the simulated expert; if the hand waits, the middle of that."""
     waited = 0.5 * (_KNOTS[1] + _KNOTS[2])
     return np.interp(steps, (*_STEPS[:1], *_STEPS[2:]), (_KNOTS[0], waited, *_KNOTS[3:]))
+
+
+def seconds_of(length: int) -> np.ndarray:
+    """When each of the ``length`` frames of a clip of the whole demonstration was taken."""
+    return np.arange(length) * (SECONDS / length)
+
+
+def frames_in_step(seconds: np.ndarray) -> np.ndarray:
+    """Which frames of a clip of the rig, taken at ``seconds`` (T,), show each simulated step best: (50,)."""
+    return np.abs(seconds - seconds_at(np.arange(LENGTH))[:, None]).argmin(axis=1)

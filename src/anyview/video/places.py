@@ -1,7 +1,7 @@
 """Where the task's object is in a picture.
 
-It is blue, in the rig as in the simulation, and nothing else on the table is as blue. So its place can be read
-off true and translated pictures alike, without anybody marking it.
+It is blue, in the rig as in the simulation, and nothing else on the table is as blue. So its place can be
+read off true and translated pictures alike, without anybody marking it.
 """
 
 import cv2

@@ -14,7 +14,7 @@ from anyview.video.places import find_object
 class FramePairs:
     """Frames ``times`` of clips ``sources`` (i) and ``targets`` (j): N pairs, of one frame each or of K.
 
-    Where i are of another set than j, ``times`` are those of i, and the data set tells which of j's are as far.
+    Where i are of another set than j, ``times`` are i's, and the data set tells which of j's are as far.
     ``sources`` and ``targets`` are (N,) and ``times`` is (N,), or all three are (N, 1), (N, 1) and (N, K).
     """
 
