@@ -89,6 +89,32 @@ def test_the_committed_params_are_sound():
             "real",
             "beyond.translators.sim-choice.dataset: 'real' is none of these: diverse, narrow, choice",
         ),
+        (
+            "beyond.translators.sim-human.experts",
+            "choice",
+            "beyond.translators.sim-human.experts: 'choice' is none of these: real, rendered",
+        ),
+        (
+            "beyond.translators.sim-human.pretraining.dataset",
+            "diverse",
+            "beyond.translators.sim-human.pretraining.dataset: 'diverse' is none of these: real, rendered",
+        ),
+        (
+            "beyond.translators.sim-human.augment",
+            True,
+            "beyond.translators.sim-human: other experts' clips are paired with any of the cell's own, and not "
+            "augmented",
+        ),
+        (
+            "beyond.cells.human.experts",
+            "choice",
+            "beyond.cells.human.experts: 'choice' is none of these: diverse, real",
+        ),
+        (
+            "beyond.cells.human.own_clips",
+            True,
+            "beyond.cells.human: held-out clips of other experts are the same for every context, and no clock's",
+        ),
         ("beyond.sets.wide", {"contexts": "choice", "demos": 4}, "beyond.split.wide: missing key"),
         (
             "beyond.cells.ours",

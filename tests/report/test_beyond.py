@@ -49,6 +49,7 @@ def test_the_page_stands_alone_and_has_its_chapters(beyond):
     assert all(source.startswith("data:") for source in page.sources)
     assert {link[1:] for link in page.links if link.startswith("#")} <= set(page.ids)
     wanted = {"choice", "one-context-under-two-clips", "where-the-object-ends", "how-many-clips", "rollouts"}
+    wanted |= {"from-a-humans-hand-to-a-robot"}
     assert wanted <= set(page.ids)
     assert all(page.alternatives)
 

@@ -23,6 +23,7 @@ from anyview.runtime.outputs import whole_folder, write_atomically
 from anyview.runtime.scratch import checkpoint_folder
 from anyview.translator.weights import read_meta
 from anyview.video.files import write_video
+from anyview.video.phases import frames_in_step, seconds_of
 
 VIDEO = "rollout.mp4"
 _NAME = "imitate"  # of the method, and of the stream of fresh contexts
@@ -93,8 +94,11 @@ def prepare(
         raise AnyviewError(f"--context {context}: there are contexts 0 to {study.imitation.runs - 1}")
     chosen = stored.choice if stored and scene.choice else None
     shown = next((colour for colour in COLOURS if colour == chosen), None)
-    by_progress = np.linspace(0, len(frames) - 1, FRAMES).round().astype(int)
-    return Task(params, folder, frames[by_progress], scene.choosing(shown) if shown else scene, shown)
+    if "experts" in meta:
+        in_step = frames_in_step(seconds_of(len(frames)))
+    else:
+        in_step = np.linspace(0, len(frames) - 1, FRAMES).round().astype(int)
+    return Task(params, folder, frames[in_step], scene.choosing(shown) if shown else scene, shown)
 
 
 def train(task: Task, output: Path) -> Outcome:
@@ -129,11 +133,14 @@ def train(task: Task, output: Path) -> Outcome:
 
 
 def _fitting_model(params: Params, dataset: str) -> Path:
-    """The translator of clips of ``dataset`` with every loss, the one with a task embedding first."""
+    """The translator of clips of ``dataset`` with every loss, the one with a task embedding first.
+
+    Before these comes one for which ``dataset`` is that of other experts.
+    """
     cells = {
         name: cell
         for name, cell in params.translator_cells.items()
-        if cell.dataset == dataset and _has_every_loss(cell.weights)
+        if (cell.dataset == dataset and _has_every_loss(cell.weights)) or cell.other_experts == dataset
     }
     trained = [name for name in cells if (paths.model(name) / "model.json").is_file()]
     if not trained:
@@ -142,11 +149,13 @@ def _fitting_model(params: Params, dataset: str) -> Path:
             f"{paths.DATA / 'models'}: no translator of {dataset} clips is trained yet ({listed}); "
             "run `dvc repro`, or name one by --model"
         )
-    return paths.model(max(trained, key=lambda name: cells[name].task_embedding))
+    return paths.model(
+        max(trained, key=lambda name: (bool(cells[name].other_experts), cells[name].task_embedding))
+    )
 
 
 def _has_every_loss(weights: LossWeights) -> bool:
-    return all(weights.model_dump().values())
+    return all((weights.translation, weights.reconstruction, weights.alignment))
 
 
 def _one_run(params: Params, model: Path, dataset: str, size: int, seed: int, episodes: int) -> Params:

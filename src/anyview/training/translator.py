@@ -126,8 +126,9 @@ class TranslatorObjective:
         return {"loss": total} | dict(zip(NAMES, means.tolist(), strict=True))
 
     def save(self, folder: Path, model: Translator, meta: dict[str, Any]) -> None:
-        """Write a model folder."""
-        save_translator(folder, model, meta)
+        """Write a model folder; its description names the set of the ``experts`` if it is another."""
+        experts = self.cell.other_experts
+        save_translator(folder, model, meta | ({"experts": experts} if experts else {}))
 
     def _learnt(self) -> list[Dataset]:
         return [self._pretraining, self.dataset] if self.cell.pretraining.iterations else [self.dataset]

@@ -127,8 +127,8 @@ def clip_pairs(dataset: Dataset, split: str) -> list[tuple[int, int]]:
     """(source, target) clips to evaluate a translator on: every clip of ``split`` once as the target.
 
     The source is the other view of the target's pair, or the next clip of the same choice if it has none. An
-    ``extreme`` target's source is a standard validation clip. Sources that are other experts' clips are those of
-    their own ``split`` in turn.
+    ``extreme`` target's source is a standard validation clip. Other experts' clips are the sources in the
+    order of their own ``split``.
     """
     targets = dataset.split(split)
     if dataset.experts:

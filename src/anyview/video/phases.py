@@ -1,4 +1,4 @@
-"""The phases of every demonstration, approach, push and rest: how clips of the rig and simulated ones keep step.
+"""The phases of a demonstration, approach, push and rest: how the rig's clips and simulated ones keep step.
 
 Both scripts follow minimum-jerk profiles within a phase, so that equal parts of it are equal progress. The
 hand of the rig waits a little between its phases, where the simulated arm does not.
@@ -19,9 +19,8 @@ def steps_at(seconds: np.ndarray) -> np.ndarray:
 
 
 def seconds_at(steps: np.ndarray) -> np.ndarray:
-    """Seconds of a clip of the rig at ``steps`` of the simulated expert; if the hand waits, the middle of that."""
-    waited = 0.5 * (_KNOTS[1] + _KNOTS[2])
-    return np.interp(steps, (*_STEPS[:1], *_STEPS[2:]), (_KNOTS[0], waited, *_KNOTS[3:]))
+    """Seconds of a clip of the rig at ``steps`` of the simulated expert; when the wait ends where it waits."""
+    return np.interp(steps, _STEPS, _KNOTS)
 
 
 def seconds_of(length: int) -> np.ndarray:
