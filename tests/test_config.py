@@ -102,8 +102,7 @@ def test_the_committed_params_are_sound():
         (
             "beyond.translators.sim-human.augment",
             True,
-            "beyond.translators.sim-human: other experts' clips are paired with any of the cell's own, and not "
-            "augmented",
+            "beyond.translators.sim-human: other experts' clips are not augmented, and paired with `any` of ",
         ),
         (
             "beyond.cells.human.experts",
@@ -113,7 +112,7 @@ def test_the_committed_params_are_sound():
         (
             "beyond.cells.human.own_clips",
             True,
-            "beyond.cells.human: held-out clips of other experts are the same for every context, and no clock's",
+            "beyond.cells.human: other experts' clips are the same for every context, and no clock's",
         ),
         ("beyond.sets.wide", {"contexts": "choice", "demos": 4}, "beyond.split.wide: missing key"),
         (

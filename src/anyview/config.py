@@ -198,9 +198,7 @@ class TranslatorCell(Block):
     @model_validator(mode="after")
     def _experts_alone(self) -> "TranslatorCell":
         if self.other_experts and (self.augment or self.pairs != "any"):
-            raise ValueError(
-                "clips of other experts are paired with any of the cell's own, and not augmented"
-            )
+            raise ValueError("other experts' clips are not augmented, and paired with `any` of the cell's")
         return self
 
     @property
@@ -401,7 +399,7 @@ class BeyondCell(DemonstrationCell):
     @model_validator(mode="after")
     def _experts_for_all(self) -> "BeyondCell":
         if self.other_experts and (self.own_clips or self.reward == "clock"):
-            raise ValueError("held-out clips of other experts are the same for every context, and no clock's")
+            raise ValueError("other experts' clips are the same for every context, and no clock's")
         return self
 
     @property
@@ -573,7 +571,8 @@ def _refuse_pretraining_alone(params: Params, name: str) -> None:
     for key in params.evidence.translators:
         if params.translators[key].pretraining.iterations:
             raise AnyviewError(
-                f"{name}: evidence.translators: {key} pretrains, and those of the evidence do not"
+                f"{name}: evidence.translators: {key} pretrains (translators.{key}.pretraining.iterations), "
+                "and those of the evidence do not"
             )
 
 

@@ -24,6 +24,8 @@ from anyview.runtime.scratch import checkpoint_folder
 from anyview.translator.weights import read_meta
 from anyview.video.files import write_video
 from anyview.video.phases import frames_in_step, seconds_of
+from anyview.video.pictures import resize
+from anyview.video.sets import read_stored
 
 VIDEO = "rollout.mp4"
 _NAME = "imitate"  # of the method, and of the stream of fresh contexts
@@ -81,7 +83,10 @@ def prepare(
     if (dataset := meta.get("dataset")) not in study.demonstration_sets:
         sets = ", ".join(study.demonstration_sets)
         raise AnyviewError(f"{folder}: not for the simulated agent's view; train it on one of {sets}")
-    frames, _ = read_clip(clip, meta["image_size"])
+    if stored and "experts" in meta:
+        frames = resize(read_stored(paths.clip_set(stored.dataset), clip)[0], meta["image_size"])
+    else:
+        frames, _ = read_clip(clip, meta["image_size"])
     if len(frames) < FRAMES:
         raise AnyviewError(f"{clip}: {len(frames)} frames, fewer than the {FRAMES} of an episode")
     params = _one_run(study, folder, str(dataset), meta["image_size"], seed, episodes)

@@ -31,19 +31,18 @@ def imitated_demonstrations(params: Params, choice: Colour | None = None) -> Cli
 
 
 def rig_demonstrations(params: Params, experts: str) -> Clips:
-    """As ``imitated_demonstrations``, of another set ``experts``, in the time and of the size of the agents'.
+    """As ``imitated_demonstrations``, of the rig's set ``experts``, in step with simulated clips.
 
     Raises AnyviewError where its split holds out fewer.
     """
-    dataset = open_dataset(params.imitation.dataset, experts)
-    assert dataset.experts is not None
-    rows, wanted = dataset.experts.split("validation"), params.imitation.demonstrations
+    dataset, wanted = open_dataset(experts), params.imitation.demonstrations
+    rows = dataset.split("validation")
     if len(rows) < wanted:
         held_out = f"{paths.split_table(experts)} holds out {len(rows)} clips"
         raise AnyviewError(f"params.yaml: imitation.demonstrations: {wanted}, but {held_out}")
     chosen = np.sort(stream(params.base.seed, "imitated").choice(rows, wanted, replace=False))
-    names = dataset.experts.clips["clip"].iloc[chosen]
-    return Clips(list(names), np.stack([dataset.expert_clip(row) for row in chosen]))
+    frames = [dataset.in_step(row, params.sim.image_size) for row in chosen]
+    return Clips(list(dataset.clips["clip"].iloc[chosen]), np.stack(frames))
 
 
 def own_demonstrations(params: Params, contexts: int, choice: Colour | None = None) -> Clips:

@@ -76,10 +76,12 @@ class Dataset:
         return times if self.experts is None else steps_at(self.experts.seconds[clips, times])
 
     def expert_clip(self, clip: int) -> np.ndarray:
-        """The experts' ``clip``, uint8 (T, H, W, 3), in the time and of the size of the set's own clips."""
-        if self.experts is None:
-            return self.frames[clip]
-        return self.expert_frames(np.array(clip), frames_in_step(self.experts.seconds[clip]))
+        """The experts' ``clip``, uint8 (T, H, W, 3), in step with the set's own clips and of their size."""
+        return self.frames[clip] if self.experts is None else self.experts.in_step(clip, self.image_size)
+
+    def in_step(self, clip: int, size: int) -> np.ndarray:
+        """A ``clip`` of the rig in step with simulated ones, uint8 RGB (50, size, size, 3)."""
+        return resize(self.frames[clip, frames_in_step(self.seconds[clip])], size)
 
     @cached_property
     def seconds(self) -> np.ndarray:

@@ -19,7 +19,7 @@ def steps_at(seconds: np.ndarray) -> np.ndarray:
 
 
 def seconds_at(steps: np.ndarray) -> np.ndarray:
-    """Seconds of a clip of the rig at ``steps`` of the simulated expert; when the wait ends where it waits."""
+    """Seconds of a clip of the rig at ``steps`` of the simulated expert, a wait taken at its end."""
     return np.interp(steps, _STEPS, _KNOTS)
 
 
