@@ -206,7 +206,7 @@ def test_the_committed_params_are_sound():
         (
             "evidence.translators",
             ["sim", "real-pretrained"],
-            "evidence.translators: real-pretrained pretrains (translators.real-pretrained.pretraining.iterations)",
+            "evidence.translators: real-pretrained pretrains (translators.real-pretrained.",
         ),
         ("real.ingest.frames", 10**6, "real.ingest.frames: Input should be less than or equal to 10000"),
     ],
