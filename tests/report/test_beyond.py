@@ -8,8 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from anyview.video.sets import write_clips, write_set
 from tests.report.test_page import Reader
-from tests.stage_outputs import SIZE, Data
+from tests.stage_outputs import SIZE, Data, clip
 
 
 def two_goals(data: Data, cell: str, distance: float) -> None:
@@ -39,6 +40,12 @@ def beyond(tmp_path_factory, params, report) -> Path:
     for index, (name, cell) in enumerate(params.beyond.cells.items()):
         make = two_goals if cell.dataset == "choice" else Data.policies
         make(data, name, 0.01 + 0.02 * index)
+    hand = data.root / "data/clips/real"
+    hand.mkdir()
+    stored = write_clips(hand / "clips.avi", clip(80, 0, 0)[None, :, ::2, ::2], 10.0)
+    write_set(hand, pd.DataFrame({"clip": ["pair-000-left"]}), [stored])
+    shown = data.root / "data/policies/human/demonstrations.csv"
+    pd.DataFrame({"clip": ["pair-000-left"]}).to_csv(shown, index=False)
     done = report(data.root, "beyond")
     assert done.returncode == 0, done.stderr
     return data.root
@@ -49,7 +56,7 @@ def test_the_page_stands_alone_and_has_its_chapters(beyond):
     assert all(source.startswith("data:") for source in page.sources)
     assert {link[1:] for link in page.links if link.startswith("#")} <= set(page.ids)
     wanted = {"choice", "one-context-under-two-clips", "where-the-object-ends", "how-many-clips", "rollouts"}
-    wanted |= {"from-a-humans-hand-to-a-robot"}
+    wanted |= {"from-a-humans-hand-to-a-robot", "a-hand-and-the-robot"}
     assert wanted <= set(page.ids)
     assert all(page.alternatives)
 
