@@ -63,7 +63,7 @@ setup-dev: .setup-stamp-dev .setup-stamp-graphics ## the same, with the tools th
 
 lock: .setup-stamp-dev ## pin every dependency but PyTorch again, with hashes (UPGRADE=--upgrade for newer ones)
 	CUSTOM_COMPILE_COMMAND="make lock" $(COMPILE) $(UPGRADE) --output-file requirements.lock pyproject.toml
-	CUSTOM_COMPILE_COMMAND="make lock" $(COMPILE) $(UPGRADE) --extra dev --extra cluster --extra lerobot \
+	CUSTOM_COMPILE_COMMAND="make lock" $(COMPILE) $(UPGRADE) --extra dev --extra cluster --extra lerobot --extra share \
 		--constraint requirements.lock --output-file requirements-dev.lock pyproject.toml
 	@! grep -nE '://|^(-|nvidia)' requirements.lock requirements-dev.lock
 

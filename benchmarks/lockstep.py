@@ -28,11 +28,12 @@ from anyview.environments.translated import TranslatedReward
 from anyview.evaluation.runs import groups_of
 from anyview.learners.common.replay import Replay
 from anyview.learners.ddpg import make_learner, minibatch_ages
-from anyview.pusher.batch import ACTION_SIZE, ACTIONS, OBSERVATION_SIZE, PusherBatch
+from anyview.pusher.batch import ACTION_SIZE, ACTIONS, PusherBatch, observation_size
 from anyview.pusher.contexts import Context, sample_contexts
 from anyview.pusher.expert import roll_out
 from anyview.pusher.render import renderer
-from anyview.pusher.scene import SUBSTEPS, model
+from anyview.pusher.scene import SUBSTEPS
+from anyview.pusher.task import load_task
 from anyview.rewards.demonstration import DemonstrationReward, translate_demonstrations
 from anyview.runtime.workers import run_tasks
 from anyview.translator.network import ContextTranslator
@@ -50,7 +51,7 @@ def make_translator(params: Params) -> ContextTranslator:
 
 def make_clips(params: Params, contexts: list[Context]) -> np.ndarray:
     """The expert in ``contexts``, (N, 50, H, W, 3)."""
-    camera, (positions, _) = renderer(params.sim.image_size), roll_out(contexts)
+    camera, (positions, _) = renderer("push", params.sim.image_size), roll_out(contexts)
     return np.stack([camera.render_clip(*each) for each in zip(contexts, positions, strict=True)])
 
 
@@ -74,7 +75,7 @@ def train_group(params: Params, runs: range, contexts: list[Context]) -> tuple[i
     clips = make_clips(params, contexts)
     cell = params.imitation.cells["ours"]
     learner, model, first = (
-        make_learner(params, runs, OBSERVATION_SIZE),
+        make_learner(params, runs, observation_size("push", 1)),
         make_translator(params),
         clips[:, 0].copy(),
     )
@@ -107,7 +108,7 @@ def train_group(params: Params, runs: range, contexts: list[Context]) -> tuple[i
 def replay_seconds(params: Params, runs: int) -> float:
     """Seconds that the replay of ``runs`` takes for an episode: drawing, gathering and storing."""
     ddpg = params.imitation.ddpg
-    width, updates = 2 * OBSERVATION_SIZE + ACTION_SIZE + 2, round(ddpg.updates_per_step * ACTIONS)
+    width, updates = 2 * observation_size("push", 1) + ACTION_SIZE + 2, round(ddpg.updates_per_step * ACTIONS)
     replay, rows = Replay(runs, ddpg.replay, width, torch.device("cpu")), torch.zeros(runs, ACTIONS, width)
     rng = np.random.default_rng(0)
 
@@ -197,10 +198,10 @@ def floors(params: Params) -> dict[str, float]:
         for layer, (before, after) in enumerate(pairwise(channels))
     )
     ddpg = params.imitation.ddpg
-    widths = [OBSERVATION_SIZE + ACTION_SIZE + ddpg.time_features, *ddpg.hidden, 1]
+    widths = [observation_size("push", 1) + ACTION_SIZE + ddpg.time_features, *ddpg.hidden, 1]
     network = 2 * sum(a * b for a, b in pairwise(widths))
-    row = 4 * (2 * OBSERVATION_SIZE + ACTION_SIZE + 2)
-    pushers = mujoco.batch.Batch(model("twist"), nsim=8, nthread=1)
+    row = 4 * (2 * observation_size("push", 1) + ACTION_SIZE + 2)
+    pushers = mujoco.batch.Batch(load_task("push").model("twist"), nsim=8, nthread=1)
     picture = empty_picture(2 * size)
     # Per update, in passes: targets 2, critic 3 (its backward counts 2), policy 3 and through the critic 2.
     return {

@@ -41,7 +41,7 @@ def main() -> None:
     phi = weights.image / weights.feature
     contexts, _ = sample_contexts(stream(params.base.seed, "tuning"), options.contexts)
     positions, _ = roll_out(contexts)
-    camera = renderer(params.sim.image_size)
+    camera = renderer("push", params.sim.image_size)
     model = load_translator(options.model)
     demonstrations = imitated_demonstrations(params).frames
     first = np.stack([camera.render_clip(c, p[:1])[0] for c, p in zip(contexts, positions, strict=True)])

@@ -30,7 +30,7 @@ def simulate(folder: Path, index: int, count: int) -> str:
     """What the stage `simulate` does for one shard; returns the checksum of its file."""
     contexts, _ = sample_contexts(stream(1, "benchmark", index), count)
     positions, _ = roll_out(contexts)
-    camera = renderer(SIZE)
+    camera = renderer("push", SIZE)
     clips = np.stack([camera.render_clip(*scene) for scene in zip(contexts, positions, strict=True)])
     return write_shard(folder, index, clips).sha256
 

@@ -13,10 +13,10 @@ import pandas as pd
 
 from anyview import paths
 from anyview.config import load_params
-from anyview.pusher.batch import TOLERANCE
 from anyview.pusher.contexts import Kind, sample_contexts
 from anyview.pusher.expert import roll_out
 from anyview.pusher.render import renderer
+from anyview.pusher.task import load_task
 from anyview.runtime.errors import choose, run_stage
 from anyview.runtime.once import once
 from anyview.runtime.outputs import whole_folder, write_atomically
@@ -28,7 +28,7 @@ from anyview.video.sets import StoredFile, write_set, write_shard
 
 
 def simulate_shard(
-    folder: Path, seed: int, name: str, kind: Kind, index: int, count: int, image_size: int
+    folder: Path, seed: int, name: str, task: str, kind: Kind, index: int, count: int, image_size: int
 ) -> dict[str, Any]:
     """Make shard ``index`` of the set ``name``, of ``count`` demonstrations, unless an earlier try did.
 
@@ -36,9 +36,10 @@ def simulate_shard(
     """
 
     def make() -> tuple[dict[str, Any], list[str]]:
-        contexts, acceptance = sample_contexts(stream(seed, f"demonstrations/{name}", index), count, kind)
+        rng = stream(seed, f"demonstrations/{name}", index)
+        contexts, acceptance = sample_contexts(rng, count, kind, task)
         positions, distances = roll_out(contexts)
-        camera = renderer(image_size)
+        camera = renderer(task, image_size)
         clips = [camera.render_clip(*scene) for scene in zip(contexts, positions, strict=True)]
         stored = write_shard(folder, index, np.stack(clips))
         rows = [
@@ -46,7 +47,7 @@ def simulate_shard(
                 "clip": f"{name}-{index:04d}-{position:04d}",
                 "shard": index,
                 "position": position,
-                "success": bool(distance < TOLERANCE),
+                "success": bool(distance < load_task(task).tolerance),
                 "final_distance": float(distance),
                 "context": context.to_json(),
             }
@@ -64,13 +65,11 @@ def main(arguments: list[str]) -> None:
     sets = params.demonstration_sets
     name = choose(arguments, sets, "python stages/simulate.py SET")
     wanted, shard, size = sets[name], params.simulate.shard, params.sim.image_size
-    folder = checkpoint_folder(["simulate", params.base.seed, name, wanted.contexts, shard, size])
+    what = (params.base.seed, name, wanted.task, wanted.contexts)
+    folder = checkpoint_folder(["simulate", *what, shard, size])
 
     counts = [min(shard, wanted.demos - first) for first in range(0, wanted.demos, shard)]
-    tasks = [
-        (folder, params.base.seed, name, wanted.contexts, index, count, size)
-        for index, count in enumerate(counts)
-    ]
+    tasks = [(folder, *what, index, count, size) for index, count in enumerate(counts)]
     records = []
     with track(f"simulate {name}", wanted.demos) as progress:
         for record in run_tasks(simulate_shard, tasks):

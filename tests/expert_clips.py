@@ -29,5 +29,5 @@ def contexts() -> list[Context]:
 def expert_clips(contexts: list[Context]) -> np.ndarray:
     """The expert in each of ``contexts``, uint8 (5, 50, 32, 32, 3)."""
     positions, _ = roll_out(contexts)
-    camera = renderer(SIZE)
+    camera = renderer("push", SIZE)
     return np.stack([camera.render_clip(*each) for each in zip(contexts, positions, strict=True)])

@@ -114,21 +114,35 @@ def test_the_committed_params_are_sound():
             True,
             "beyond.cells.human: other experts' clips are the same for every context, and no clock's",
         ),
-        ("beyond.sets.wide", {"contexts": "choice", "demos": 4}, "beyond.split.wide: missing key"),
+        (
+            "beyond.sets.wide",
+            {"task": "push", "contexts": "choice", "demos": 4},
+            "beyond.split.wide: missing key",
+        ),
+        ("beyond.cells.clock.own_clips", True, "beyond.cells.clock: own_clips: a clock hears of no clip"),
+        (
+            "beyond.cells.clips-1.incomplete",
+            {"every": 30, "until": 0.5},
+            "beyond.cells.clips-1.incomplete: no frame but the first would be left",
+        ),
         (
             "beyond.cells.ours",
             VALUES["beyond"]["cells"]["choice"],
             "beyond.cells.ours: the name is taken by imitation.cells or adversarial.cells",
         ),
-        ("simulate.sets", {"wide": {"contexts": "diverse", "demos": 4}}, "split.wide: missing key"),
+        (
+            "simulate.sets",
+            {"wide": {"task": "push", "contexts": "diverse", "demos": 4}},
+            "split.wide: missing key",
+        ),
         (
             "simulate.sets.rendered",
-            {"contexts": "diverse", "demos": 4},
+            {"task": "push", "contexts": "diverse", "demos": 4},
             "simulate.sets.rendered: the name is taken by the clips that stage render makes",
         ),
         (
             "simulate.sets.real",
-            {"contexts": "diverse", "demos": 4},
+            {"task": "push", "contexts": "diverse", "demos": 4},
             "simulate.sets.real: the name is taken by the clips that stage ingest makes",
         ),
         (

@@ -15,6 +15,7 @@ from dvc.dependency.param import ParamsDependency
 from dvc.repo import Repo
 
 from anyview.config import load_params
+from anyview.pusher.task import task_names
 
 ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "src"
@@ -74,6 +75,9 @@ def reached_from(path: Path) -> set[str]:
     return {str(file.relative_to(ROOT)) for file in reached}
 
 
+TASKS = {f"src/anyview/tasks/{name}.py" for name in task_names()}
+"""Loaded by name, by what imports `load_task`."""
+
 TESTS_OF_A_WHOLE = {"test_browser.py", "test_kills.py", "test_resume.py"}
 
 MODULES = sorted(SOURCE.rglob("*.py"))
@@ -104,7 +108,7 @@ def test_every_import_is_declared():
         name: {dist.lower().replace("_", "-") for dist in distributions.get(name, [name])} for name in used
     }
     extras = project["optional-dependencies"]
-    optional = names([*extras["cluster"], *extras["lerobot"]])
+    optional = names([*extras["cluster"], *extras["lerobot"], *extras["share"]])
     assert {name for name, found in owners.items() if not found & (required | optional)} == set()
     assert required - set().union(*owners.values()) == set()
 
@@ -162,9 +166,12 @@ def test_a_stage_depends_on_the_code_that_it_runs(script, folder):
 
     Cells may differ where each runs code of its own (a learner, a reward); together they name all of it.
     """
+    reached = reached_from(script)
+    if "src/anyview/pusher/task.py" in reached:
+        reached |= TASKS if folder == BEYOND else {"src/anyview/tasks/push.py"}
     reached = {
         file
-        for file in reached_from(script)
+        for file in reached
         if not file.startswith(WITHOUT_EFFECT_ON_RESULTS) and not file.endswith("__init__.py")
     }
     own = str(script.relative_to(folder))

@@ -42,6 +42,8 @@ Fraction = Annotated[float, Field(ge=0, le=1)]
 Discount = Annotated[float, Field(ge=0, lt=1)]
 Name = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9_-]{0,63}$")]  # of a folder, too
 
+TaskName = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,63}$")]  # of a module
+
 
 class Block(BaseModel):
     """A block of params: no unknown keys, no silent conversions, no infinities."""
@@ -56,7 +58,7 @@ class Base(Block):
 
 
 class Sim(Block):
-    """The pusher's world, the same for demonstrations and agents."""
+    """The simulated world, the same for demonstrations and agents."""
 
     image_size: Literal[32, 64, 128] = Field(description="height and width of a frame in pixels")
     control: Literal["twist", "torque"] = Field(
@@ -67,6 +69,9 @@ class Sim(Block):
 class DemonstrationSet(Block):
     """One set of simulated demonstrations."""
 
+    task: TaskName = Field(
+        description="a module of `src/anyview/tasks`, or one of your own, `anyview_<task>`"
+    )
     contexts: Literal["diverse", "narrow", "choice"] = Field(
         description="`diverse`: seen from anywhere, with distractors; `narrow`: from four sides, without; "
         "`choice`: as diverse, with a red goal and a green one, of which a demonstration goes to either"
@@ -406,6 +411,12 @@ class BeyondCell(DemonstrationCell):
     def other_experts(self) -> str | None:
         """The set of the clips that are imitated if it is not `dataset`."""
         return None if self.experts == self.dataset else self.experts
+
+    @model_validator(mode="after")
+    def _clips_to_own(self) -> "BeyondCell":
+        if self.own_clips and self.reward == "clock":
+            raise ValueError("own_clips: a clock hears of no clip")
+        return self
 
 
 class Beyond(Block):

@@ -6,7 +6,10 @@ from torch.nn import functional as F
 
 from anyview.adversarial import tpil
 from anyview.adversarial.tpil import PairDiscriminator, ReverseGradient, tpil_reward
-from anyview.pusher.batch import PusherBatch
+from anyview.pusher.contexts import sample_contexts
+from anyview.pusher.expert import roll_out
+from anyview.pusher.render import renderer
+from anyview.seeds import stream
 from anyview.video.pixels import to_input
 from tests.learners.toy import LAST, PARAMS, SIZE, clip_set, expert_motion, random_motion, show, squares
 
@@ -88,10 +91,20 @@ def test_it_prefers_the_experts_motion_in_a_view_where_it_never_saw_it():
     assert expert > random + 0.2
 
 
-def test_random_motion_starts_as_the_contexts_do_and_moves(contexts):
-    clips = tpil.random_motion(contexts[:2], np.random.default_rng(0), 0.5, "twist", 32)
-    batch = PusherBatch(contexts[:2], "twist", 32)
-    batch.reset()
-    np.testing.assert_array_equal(clips[:, 0], batch.render())
-    assert clips.shape == (2, 50, 32, 32, 3)
-    assert (clips[:, 1:] != clips[:, :-1]).any((2, 3, 4)).mean() > 0.9
+def test_bystanders_push_the_object_away_from_where_it_lies_and_from_where_the_expert_brings_it():
+    contexts, _ = sample_contexts(stream(0, "test"), 12, "narrow")  # nothing else there is blue
+    clips = tpil.wrong_pushes(contexts, np.random.default_rng(0), 64)
+    assert clips.shape == (12, 50, 64, 64, 3)
+    positions, _ = roll_out(contexts)
+    expert = renderer("push", 64).render(contexts, positions[:, -1])
+    start, end, goal = map(blue_centre, (clips[:, 0], clips[:, -1], expert))
+    np.testing.assert_array_equal(clips[:, 0], renderer("push", 64).render(contexts, positions[:, 0]))
+    assert np.linalg.norm(end - start, axis=-1).min() > 2  # pixels
+    assert np.median(np.linalg.norm(end - goal, axis=-1)) > 6
+
+
+def blue_centre(frames: np.ndarray) -> np.ndarray:
+    """Where the object is in ``frames`` (N, H, W, 3): pixels (N, 2)."""
+    red, green, blue = np.moveaxis(frames.astype(int), -1, 0)
+    seen = blue > 1.5 * np.maximum(red, green)
+    return np.stack([np.argwhere(each).mean(0) for each in seen])

@@ -77,8 +77,8 @@ def test_the_object_is_found_where_lens_and_camera_put_it():
 def test_the_simulated_object_is_found_beside_distractors_of_any_colour():
     contexts, _ = sample_contexts(np.random.default_rng(4), 40)
     positions = np.array([[*context.arm_qpos, *context.object_xy] for context in contexts])
-    frames = renderer(64).render(contexts, positions)
-    bare = renderer(64).render(contexts, positions - [0, 0, 0, 9, 9])  # the object out of sight
+    frames = renderer("push", 64).render(contexts, positions)
+    bare = renderer("push", 64).render(contexts, positions - [0, 0, 0, 9, 9])  # the object out of sight
     errors = []
     for frame, without in zip(frames, bare, strict=True):
         rows, columns = np.nonzero((frame != without).any(axis=-1))

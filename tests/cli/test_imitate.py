@@ -97,7 +97,9 @@ def folder(tmp_path_factory, root: Path, translator, contexts, expert_clips) -> 
 
 def filmed(contexts: list[Context]) -> np.ndarray:
     positions, _ = roll_out(contexts)
-    return np.stack([renderer(SIZE).render_clip(*each) for each in zip(contexts, positions, strict=True)])
+    return np.stack(
+        [renderer("push", SIZE).render_clip(*each) for each in zip(contexts, positions, strict=True)]
+    )
 
 
 def test_a_video_of_ones_own_becomes_a_policy(folder, expert_clips):
@@ -160,13 +162,13 @@ def test_a_clip_of_a_set_says_which_goal_it_shows_and_a_video_does_not(folder):
         ("text.mp4", {}, "text.mp4: not a video"),
         ("data", {}, "data: no such file"),
         ("short.avi", {}, "short.avi: 20 frames, fewer than the 50 of an episode"),
-        ("real-0", {"model": Path("sim")}, "real-0: frames of 16 pixels, but the translator's are 32"),
+        ("real-0", {"model": "sim"}, "real-0: frames of 16 pixels, but the translator's are 32"),
         (
             "real-0",
             {},
             "data/models/real-adam: not for the simulated agent's view; train it on one of diverse, ",
         ),
-        ("own.avi", {"model": Path("tcn")}, "data/models/tcn/model.json: no such file; train the cell first"),
+        ("own.avi", {"model": "tcn"}, "data/models/tcn/model.json: no such file; train the cell first"),
         ("own.avi", {"context": 3}, "--context 3: there are contexts 0 to 2"),
         ("own.avi", {"output": Path("data")}, "data: it exists and is no earlier result"),
     ],

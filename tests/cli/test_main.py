@@ -7,18 +7,8 @@ from pathlib import Path
 
 import pytest
 
-COMMANDS = [
-    "doctor",
-    "profile",
-    "record",
-    "clips",
-    "translate",
-    "imitate",
-    "watch",
-    "review",
-    "sweep",
-    "clean",
-]
+COMMANDS = ["repro", "doctor", "profile", "record", "clips", "export", "translate", "imitate"]
+COMMANDS += ["watch", "export-policy", "push", "pull", "review", "sweep", "clean"]
 
 
 @pytest.fixture

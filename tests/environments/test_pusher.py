@@ -7,6 +7,7 @@ import sys
 import warnings
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import Any
 
 import gymnasium as gym
@@ -19,22 +20,24 @@ from gymnasium.wrappers.vector import RecordEpisodeStatistics
 from anyview.pusher.contexts import sample_contexts
 
 ENV_ID = "anyview/Pusher3DoF-v0"
+ENV_IDS = [f"anyview/{name}3DoF-v0" for name in ("Pusher", "Reacher", "Striker", "Sweeper")]
 NAN, INF = float("nan"), float("inf")
 
 
-def single(**options: Any) -> gym.Env:
-    return gym.make(ENV_ID, **options)
+def single(env_id: str = ENV_ID, **options: Any) -> gym.Env:
+    return gym.make(env_id, **options)
 
 
-def vector(count: int = 2, **options: Any) -> gym.vector.VectorEnv:
-    return gym.make_vec(ENV_ID, num_envs=count, vectorization_mode="vector_entry_point", **options)
+def vector(count: int = 2, env_id: str = ENV_ID, **options: Any) -> gym.vector.VectorEnv:
+    return gym.make_vec(env_id, num_envs=count, vectorization_mode="vector_entry_point", **options)
 
 
 @pytest.mark.parametrize("control", ["twist", "torque"])
-def test_check_env_passes_without_a_warning(control: str) -> None:
+@pytest.mark.parametrize("env_id", ENV_IDS)
+def test_check_env_passes_without_a_warning(env_id: str, control: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        check_env(gym.make(ENV_ID, control=control, render_mode="rgb_array").unwrapped)
+        check_env(gym.make(env_id, control=control, render_mode="rgb_array").unwrapped)
 
 
 def test_importing_the_package_is_enough() -> None:
@@ -50,10 +53,11 @@ def test_a_misspelt_choice_is_refused(name: str, value: str) -> None:
             make(ENV_ID, **{name: value})
 
 
-def test_vector_environment_equals_single_ones_step_for_step() -> None:
+@pytest.mark.parametrize("env_id", ENV_IDS)
+def test_vector_environment_equals_single_ones_step_for_step(env_id: str) -> None:
     count = 3
-    together = vector(count)
-    alone = [single() for _ in range(count)]
+    together = vector(count, env_id)
+    alone = [single(env_id) for _ in range(count)]
     observations, _ = together.reset(seed=7)
     singles = [env.reset(seed=7 + i)[0] for i, env in enumerate(alone)]
     np.testing.assert_array_equal(observations, singles)
@@ -135,9 +139,11 @@ def test_an_impossible_action_is_refused_and_changes_nothing(
 
 def test_an_impossible_reset_is_refused() -> None:
     context = sample_contexts(np.random.default_rng(1), 1)[0][0]
+    striking = sample_contexts(np.random.default_rng(1), 1, task="strike")[0][0]
     for options, complaint in (
         ({"context": {"azimuth": 0.0}}, "context: expected a Context .*, got {'azimuth': 0.0}"),
         ({"contexts": [context]}, "options: 'contexts': expected 'context'"),
+        ({"context": striking}, "context: it is one of task strike, but the environment is for push"),
     ):
         with pytest.raises(ValueError, match=complaint):
             single().reset(options=options)
@@ -173,7 +179,7 @@ def unfold(env: Any, steps: int) -> list[Any]:
     return [env.step(env.action_space.sample()) for _ in range(steps)]
 
 
-@pytest.mark.parametrize("make", [single, vector])
+@pytest.mark.parametrize("make", [single, vector, partial(single, ENV_IDS[2])])
 @pytest.mark.parametrize("control", ["twist", "torque"])
 @pytest.mark.parametrize("again", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
 @pytest.mark.parametrize("steps", [None, 0, 20])

@@ -51,7 +51,7 @@ def study(tmp_path_factory, root: Path) -> Path:
     contexts = sample_contexts(stream(0, "test"), CLIPS, "choice")[0]
     contexts = [context.choosing(COLOURS[index % 2]) for index, context in enumerate(contexts)]
     positions, _ = roll_out(contexts)
-    clips = [renderer(SIZE).render_clip(*each) for each in zip(contexts, positions, strict=True)]
+    clips = [renderer("push", SIZE).render_clip(*each) for each in zip(contexts, positions, strict=True)]
     names = [f"choice-{index}" for index in range(CLIPS)]
     where = folder / "data/clips/choice"
     where.mkdir(parents=True)

@@ -6,6 +6,8 @@ from collections.abc import Iterator
 import pytest
 
 from tests.clusters import two_nodes
+from tests.conftest import Study
+from tests.long_stages import digests
 from tests.parallel.toys import DIAMOND, Toy
 
 
@@ -36,3 +38,13 @@ def test_a_cluster_makes_the_lock_of_dvc_repro(tmp_path, cluster):
     said, _ = process.communicate(timeout=180)
     assert process.returncode == 0, said
     assert "Data and pipelines are up to date." in toy.run("dvc", "repro")
+
+
+@pytest.mark.slow
+def test_a_cluster_makes_the_smoke_profile_of_dvc_repro(trunk: Study, smoke: Study, tmp_path, cluster):
+    """On nodes of one core, although stages can use more."""
+    study = trunk.copy(tmp_path)
+    study.run("anyview", "repro", ANYVIEW_BACKEND="ray", RAY_ADDRESS=cluster.address)
+    assert (study.folder / "dvc.lock").read_bytes() == (smoke.folder / "dvc.lock").read_bytes()
+    assert digests(study.folder / "metrics") == digests(smoke.folder / "metrics")
+    assert "up to date" in study.run("dvc", "repro")

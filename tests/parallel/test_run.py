@@ -1,9 +1,15 @@
 """`anyview repro` by the real command line: the results of plain `dvc repro`, whatever the number of jobs."""
 
 import json
+import os
+import pty
+import re
 import signal
+import termios
 import time
+from contextlib import suppress
 
+import psutil
 import pytest
 
 from tests.parallel.toys import DIAMOND, Toy
@@ -117,6 +123,31 @@ def test_an_unchanged_dependency_that_two_share_blocks_none(plain, tmp_path):
     assert "1 ran" in said
 
 
+def test_a_stage_that_is_ended_alone_is_told(plain, tmp_path):
+    """By SIGTERM, as by an administrator, while it waits for another DVC that runs it."""
+    toy = plain.copy(tmp_path / "toy")
+    text = DIAMOND.replace("sleep 0.2", "touch here-${item}; until [ -e go ]; do sleep 0.01; done")
+    (toy.folder / "dvc.yaml").write_text(text)
+    other = toy.start("dvc", "repro", "--single-item", "middle@left")
+    toy.wait_for("here-left", other)
+    process = toy.start("anyview", "repro", "--jobs", "1", "middle@left", "end")
+    log = toy.folder / ".dvc/tmp/parallel/logs/middle@left.log"
+    toy.wait_for(str(log), process)
+    while "waiting" not in log.read_text():
+        time.sleep(0.02)
+    (child,) = psutil.Process(process.pid).children()
+    child.terminate()
+    child.wait()
+    (toy.folder / "go").touch()
+    said, _ = process.communicate(timeout=60)
+    other.communicate()
+    assert process.returncode == 1, said
+    told = "middle@left interrupted: ended by SIGTERM; run the same command again to continue; its log: cat "
+    assert f"{told}'.dvc/tmp/parallel/logs/middle@left.log'" in said
+    assert "skipped: end" in said
+    assert "1 interrupted" in said
+
+
 def test_each_stage_has_its_part_of_the_cores(fresh, tmp_path):
     text = "stages:\n  a: {cmd: echo $ANYVIEW_WORKERS > a, outs: [a], meta: {cores: 3}}\n"
     toy = fresh.copy(tmp_path / "toy")
@@ -128,6 +159,36 @@ def test_each_stage_has_its_part_of_the_cores(fresh, tmp_path):
     assert said == "error: stage a: meta.cores=many: must be a whole number of at least 1\n"
     (toy.folder / "dvc.yaml").write_text(text.replace("cores: 3", "gpus: 99"))
     assert "error: stage a: meta.gpus=99, and this machine has " in toy.run("anyview", "repro", code=2)
+
+
+COUNTING = """
+stages:
+  first: {cmd: "echo 3/4; until [ -e go ]; do sleep 0.05; done; touch first", outs: [first]}
+  second:
+    foreach: [left, right]
+    do: {cmd: "cp first ${item}", deps: [first], outs: ["${item}"]}
+"""
+
+
+def test_on_a_terminal_a_table_shows_what_runs_and_what_waits(fresh, tmp_path):
+    toy = fresh.copy(tmp_path / "toy")
+    (toy.folder / "dvc.yaml").write_text(COUNTING)
+    screen, terminal = pty.openpty()
+    termios.tcsetwinsize(terminal, (20, 70))
+    process = toy.start("anyview", "repro", "--jobs", "2", stdout=terminal, TERM="xterm")
+    os.close(terminal)
+    said = ""
+    while "wait for first" not in said or "75%" not in said:
+        said += os.read(screen, 4096).decode()
+    (toy.folder / "go").touch()
+    assert re.search(r"first +█{12}░{4} +\S+ s +75% .*3/4", said), said
+    assert "second@left, second@right wait for first" in said
+    with suppress(OSError):  # as reading a terminal ends
+        while part := os.read(screen, 4096).decode():
+            said += part
+    assert process.wait() == 0
+    assert "first: ran in " in said
+    assert said.rpartition("\n")[0].endswith("3 ran\r")
 
 
 SLOW = """

@@ -39,14 +39,16 @@ class Toy:
         other.folder = folder
         return other
 
-    def start(self, *command: str, **environment: str) -> subprocess.Popen[str]:
+    def start(
+        self, *command: str, stdout: int = subprocess.PIPE, **environment: str
+    ) -> subprocess.Popen[str]:
         """Start ``command`` in a session of its own."""
         path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
         return subprocess.Popen(
             [shutil.which(command[0], path=path) or command[0], *command[1:]],
             cwd=self.folder,
             env=os.environ | {"PATH": path, "SHELL": "/bin/sh", "DVC_NO_ANALYTICS": "1"} | environment,
-            stdout=subprocess.PIPE,
+            stdout=stdout,
             stderr=subprocess.STDOUT,
             text=True,
             start_new_session=True,

@@ -6,10 +6,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from anyview.pusher.batch import MAX_TWIST, TOLERANCE, PusherBatch, observation_size
+from anyview.pusher.batch import MAX_TWIST, PusherBatch, observation_size
 from anyview.pusher.contexts import COLOURS, sample_contexts
-from anyview.pusher.expert import roll_out
-from anyview.pusher.scene import ARENA_CENTRE, ARENA_RADIUS, model
+from anyview.pusher.scene import ARENA_CENTRE, ARENA_RADIUS
+from anyview.pusher.task import load_task
 
 CONTEXTS, _ = sample_contexts(np.random.default_rng(11), 5)
 
@@ -31,7 +31,7 @@ def test_torque_steps_equal_mj_step() -> None:
     context = CONTEXTS[0]
     batch = PusherBatch([context], "torque")
     batch.reset()
-    scene = model("torque")
+    scene = load_task("push").model("torque")
     data = mujoco.MjData(scene)
     data.qpos[:] = [*context.arm_qpos, *context.object_xy]
     for action in np.random.default_rng(1).uniform(-1, 1, (20, 3)):
@@ -83,26 +83,6 @@ def test_a_pickled_batch_continues_exactly() -> None:
     np.testing.assert_array_equal(twin.render(), batch.render())
 
 
-def test_expert_succeeds_in_unseen_contexts_on_one_time_profile() -> None:
-    contexts, _ = sample_contexts(np.random.default_rng(987654321), 1000)
-    positions, distances = roll_out(contexts)
-    assert (distances < TOLERANCE).mean() >= 0.99
-    speed = np.linalg.norm(np.diff(positions[:, :, 3:], axis=1), axis=-1)
-    assert speed[:, :13].max() < 1e-6  # nobody touches the object before the push
-    assert (speed[:, 22:38].min(axis=1) > 0.004).all()  # everybody pushes at the same steps
-    assert speed[:, 44:].max() < 1e-3  # and rests at the same steps
-
-
-def test_the_expert_reaches_either_goal_on_the_same_time_profile() -> None:
-    contexts, _ = sample_contexts(np.random.default_rng(123456789), 1000, "choice")
-    for colour in COLOURS:
-        positions, distances = roll_out([context.choosing(colour) for context in contexts])
-        assert (distances < TOLERANCE).mean() >= 0.99
-        speed = np.linalg.norm(np.diff(positions[:, :, 3:], axis=1), axis=-1)
-        assert speed[:, :13].max() < 1e-6
-        assert speed[:, 44:].max() < 1e-3
-
-
 def test_an_observation_does_not_tell_which_goal_counts() -> None:
     contexts, _ = sample_contexts(np.random.default_rng(4), 6, "choice")
     red, green = (PusherBatch([context.choosing(colour) for context in contexts]) for colour in COLOURS)
@@ -111,7 +91,7 @@ def test_an_observation_does_not_tell_which_goal_counts() -> None:
         seen = red.step(actions)
         np.testing.assert_array_equal(seen, green.step(actions))
     np.testing.assert_array_equal(red.render(), green.render())
-    assert seen.shape == (6, observation_size(2)) == (6, 17)
+    assert seen.shape == (6, observation_size("push", 2)) == (6, 17)
     goals = np.array([context.goals for context in contexts])  # red, then green
     places = ARENA_CENTRE + ARENA_RADIUS * seen[:, 12:16].reshape(6, 2, 2)
     np.testing.assert_allclose(places, goals, atol=1e-6)

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from anyview.pusher.contexts import COLOURS, Choice, Context, Distractor, sample_contexts
 from anyview.pusher.kinematics import tool_pose
-from anyview.pusher.path import clearance, expert_poses
-from anyview.pusher.scene import ARENA_CENTRE, ARENA_RADIUS, GOAL_COLOURS, JOINT_RANGE, OBJECT_COLOUR, SEAT
+from anyview.pusher.path import clearance
+from anyview.pusher.scene import ARENA_CENTRE, ARENA_RADIUS, GOAL_COLOURS, JOINT_RANGE, OBJECT_COLOUR
+from anyview.tasks.push import CUP, OBJECT_RADIUS
 
 
 @settings(max_examples=8, deadline=None)
@@ -30,7 +31,8 @@ def test_contexts_obey_their_definition(seed: int, kind: str) -> None:
         for place in (object_xy, *goals):
             assert np.linalg.norm(place - ARENA_CENTRE) <= ARENA_RADIUS
         assert (np.abs(context.arm_qpos) < JOINT_RANGE).all()
-        assert clearance(tool_pose(np.array(context.arm_qpos))[None, None], object_xy[None])[0] > 0
+        start = tool_pose(np.array(context.arm_qpos))[None, None]
+        assert clearance(CUP, OBJECT_RADIUS, start, object_xy[None, None])[0] > 0
         for distractor in context.distractors:
             for colour in (*list(GOAL_COLOURS.values())[: len(goals)], OBJECT_COLOUR):
                 assert np.linalg.norm(np.array(distractor.colour) - colour) >= 0.5
@@ -120,15 +122,3 @@ def test_narrow_contexts_look_from_four_sides_at_a_bare_table() -> None:
     assert all(c.distractors == () for c in contexts)
     sides = {round(np.rad2deg(c.azimuth) / 90) % 4 for c in contexts}
     assert sides == {0, 1, 2, 3}
-
-
-def test_the_path_pushes_from_behind_the_object_to_the_goal() -> None:
-    contexts, _ = sample_contexts(np.random.default_rng(5), 50)
-    arm, start, goal = (
-        np.array([getattr(c, n) for c in contexts]) for n in ("arm_qpos", "object_xy", "goal_xy")
-    )
-    poses = expert_poses(arm, start, goal)
-    np.testing.assert_allclose(poses[:, 0], tool_pose(arm), atol=1e-12)
-    seat = poses[:, -1, :2] + SEAT * np.stack([np.cos(poses[:, -1, 2]), np.sin(poses[:, -1, 2])], -1)
-    np.testing.assert_allclose(seat, goal, atol=1e-12)
-    assert (np.diff(poses[:, 42:], axis=1) == 0).all()  # rest at the end

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
 from anyview.pusher.kinematics import jacobian, joint_velocity, joints_for, tool_pose, wrap
-from anyview.pusher.scene import LINK, model
+from anyview.pusher.scene import LINK
+from anyview.pusher.task import load_task
 
 joints = npst.arrays(float, 3, elements=st.floats(-2.7, 2.7))
 twists = npst.arrays(float, 3, elements=st.floats(-1, 1))
@@ -15,7 +16,7 @@ twists = npst.arrays(float, 3, elements=st.floats(-1, 1))
 
 @given(joints)
 def test_tool_pose_equals_mujoco(angles: np.ndarray) -> None:
-    scene = model("twist")
+    scene = load_task("push").model("twist")
     data = mujoco.MjData(scene)
     data.qpos[:3] = angles
     mujoco.mj_kinematics(scene, data)

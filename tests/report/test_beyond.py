@@ -64,7 +64,7 @@ def test_the_page_stands_alone_and_has_its_chapters(beyond):
 def test_tables_tell_of_every_cell(beyond, params):
     text = (beyond / "data/beyond/report.md").read_text(encoding="utf-8")
     tables = [block.splitlines() for block in text.split("\n\n") if block.startswith("|")]
-    assert len(tables) == 7
+    assert len(tables) == 8
     for rows in tables:
         assert {row.count(" | ") for row in rows} == {rows[0].count(" | ")}
     rows = {row.split(" | ")[0]: row for row in tables[-1]}

@@ -52,7 +52,7 @@ def test_the_choice_is_made_once_and_inherited():
 
 
 RENDERERS = {
-    "the pusher": "from anyview.pusher.render import renderer; renderer(64)",
+    "the pusher": 'from anyview.pusher.render import renderer; renderer("push", 64)',
     "MuJoCo's own": (
         "from anyview.runtime.graphics import load_mujoco; mujoco = load_mujoco();"
         "mujoco.Renderer(mujoco.MjModel.from_xml_string('<mujoco/>'), 8, 8)"

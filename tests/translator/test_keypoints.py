@@ -1,6 +1,7 @@
 """The translator of keypoints: places are found, moved and drawn."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import hypothesis.extra.numpy as hnp
 import hypothesis.strategies as st
@@ -14,7 +15,7 @@ from anyview.seeds import stream
 from anyview.training.augmentation import mirror
 from anyview.training.common.fit import fit
 from anyview.training.translator import TranslatorObjective
-from anyview.translator.keypoints import KEYPOINTS, KeypointTranslator, place_loss
+from anyview.translator.keypoints import KEYPOINTS, KeypointTranslator, _strokes, place_loss
 from anyview.translator.losses import Marks
 from anyview.translator.weights import load_translator
 from anyview.video.marks import write_marks
@@ -52,6 +53,19 @@ def test_at_first_the_context_is_copied_more_than_painted_over(model):
         made = model.decode(z2, skips)
     noise = contexts.flip(0)
     assert (made - contexts).square().mean() < 0.3 * (noise - contexts).square().mean()
+
+
+@settings(max_examples=15, deadline=None)
+@given(hnp.arrays(np.float32, (1, KEYPOINTS, 2), elements=st.floats(-1.25, 1.25, width=32)))
+def test_strokes_are_gaussians_around_places_and_lines(places):
+    """Against the distance of each pixel's centre from a point, or from a dense row of points."""
+    made = _strokes(torch.from_numpy(places), torch.zeros(1, 1, 12, 12))[0].numpy()
+    centres = (2 * np.arange(12) + 1) / 12 - 1
+    pixels = np.stack(np.meshgrid(centres, centres), -1)
+    lines = [a + (b - a) * np.linspace(0, 1, 400)[:, None] for a, b in pairwise(places[0])]
+    for points, stroke in zip([*places[0][:, None], *lines], made, strict=True):
+        gap = np.linalg.norm(pixels[:, :, None] - points, axis=-1).min(axis=-1) * 6  # in pixels of the map
+        np.testing.assert_allclose(stroke, np.exp(-(gap**2) / 2), atol=0.01)
 
 
 @settings(max_examples=30, deadline=None)

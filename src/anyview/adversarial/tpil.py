@@ -2,12 +2,14 @@
 
 Features of a frame serve two heads: the class head tells expert from not, on a pair of frames; the domain
 head tells the expert's view from the agent's, on one frame, and its gradient is reversed on its way into the
-features. The view must not give the class away. So there is a third set, the "bystander": random motion in
-the expert's views. The paper's words for the three sets are expert, novice (here the agent) and random policy
-in the expert's domain (here the bystander).
+features. The view must not give the class away. So there is a third set, the "bystander": pushes to wrong
+places in the expert's views. The paper's words for the three sets are expert, novice (here the agent) and
+random policy in the expert's domain (here the bystander). Random actions hardly move the object: then the
+class head has to see no more than that it moves.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,15 +26,15 @@ from anyview.adversarial.common.discriminators import (
 )
 from anyview.evaluation.demonstrations import training_clips
 from anyview.evaluation.methods import Group, Scoring, first_demonstration
-from anyview.pusher.batch import ACTION_SIZE, PusherBatch
-from anyview.pusher.contexts import Context
-from anyview.pusher.episodes import film
+from anyview.pusher.contexts import Context, sample_contexts
+from anyview.pusher.expert import roll_out
+from anyview.pusher.render import renderer
 from anyview.seeds import stream
 
 _CHANNELS = 5
 _WIDTH = 128
 _LEAK = 0.2
-_BYSTANDERS = 100  # clips of random motion
+_BYSTANDERS = 100  # clips of wrong pushes
 
 
 class ReverseGradient(torch.autograd.Function):
@@ -132,24 +134,28 @@ def tpil_reward(
     )
 
 
-def random_motion(
-    contexts: Sequence[Context], rng: np.random.Generator, std: float, control: str, image_size: int
-) -> np.ndarray:
-    """Clips (N, T + 1, H, W, 3), one in each context, of an arm whose actions are N(0, ``std``^2)."""
-    batch = PusherBatch(contexts, control, image_size)
-    return film(batch, lambda now: std * rng.standard_normal((batch.count, ACTION_SIZE)))
+def wrong_pushes(contexts: Sequence[Context], rng: np.random.Generator, image_size: int) -> np.ndarray:
+    """Clips (N, T + 1, H, W, 3), one in each context, of the expert's motion to other goals than is seen.
+
+    Where the arm does not reach one, the push ends on the way.
+    """
+    others, _ = sample_contexts(rng, len(contexts), task=contexts[0].task)
+    positions, _ = roll_out(
+        [replace(context, goal_xy=other.goal_xy) for context, other in zip(contexts, others, strict=True)]
+    )
+    camera = renderer(contexts[0].task, image_size)
+    return np.stack([camera.render_clip(*each) for each in zip(contexts, positions, strict=True)])
 
 
 def make_reward(group: Group) -> Scoring:
-    """The reward of ``group`` against the same clips as GAIL, and random motion in the contexts of some."""
+    """The reward of ``group`` against the same clips as GAIL, and wrong pushes in the contexts of some."""
     frames, rows, contexts = training_clips(group.params)
     params, runs = group.params, group.runs
-    trpo, sim = params.imitation.trpo, params.sim
     rng = stream(params.base.seed, "bystanders")
     chosen = [contexts[index] for index in rng.permutation(len(contexts))[:_BYSTANDERS]]
-    motion = random_motion(chosen, rng, trpo.initial_std, sim.control, sim.image_size)
+    pushes = wrong_pushes(chosen, rng, params.sim.image_size)
     experts = [ClipSet(frames, rows)] * len(runs)
-    bystanders = [ClipSet(motion, np.arange(len(motion)))] * len(runs)
+    bystanders = [ClipSet(pushes, np.arange(len(pushes)))] * len(runs)
     discriminator, seed = params.adversarial.discriminator, params.base.seed
-    reward = tpil_reward(discriminator, seed, runs, experts, bystanders, trpo.batch_episodes)
+    reward = tpil_reward(discriminator, seed, runs, experts, bystanders, params.imitation.trpo.batch_episodes)
     return Scoring(reward, np.ones(len(runs)), first_demonstration(group), fixed=False)

@@ -8,32 +8,36 @@ from anyview.analysis.choice import against_choice, choices, choosing
 from anyview.analysis.clips import by_clips, tuning
 from anyview.analysis.estimates import Estimator
 from anyview.analysis.metrics import Tree, details
-from anyview.analysis.results import Results, analyse
+from anyview.analysis.results import Results, analyse, outcomes
 from anyview.analysis.study import Study
+from anyview.analysis.tasks import by_task
 
 
 @dataclass(frozen=True)
 class BeyondResults:
     """``choices`` and ``against_choice``: see ``analysis.choice``; ``clips``: see ``analysis.clips``.
 
-    ``others``: all else, as of the thesis.
+    ``tasks``: ``results.outcomes`` in other tasks. ``others``: all else, as of the thesis.
     """
 
     choices: pd.DataFrame
     against_choice: pd.DataFrame
     clips: pd.DataFrame
+    tasks: pd.DataFrame
     others: Results
 
 
 def analyse_beyond(study: Study) -> BeyondResults:
     """Compute every table. ``study`` was read by params ``going_beyond``."""
     estimator = Estimator(study.params.base.seed)
-    elsewhere = {*choosing(study.methods), *tuning(study.params, study.methods)}
-    alone = {cell: method for cell, method in study.methods.items() if cell not in elsewhere}
+    elsewhere = {cell: method for methods in by_task(study).values() for cell, method in methods.items()}
+    apart = {*choosing(study.methods), *tuning(study.params, study.methods), *elsewhere}
+    alone = {cell: method for cell, method in study.methods.items() if cell not in apart}
     return BeyondResults(
         choices(study.methods, estimator),
         against_choice(study.methods, estimator),
         by_clips(study.params, study.methods, estimator),
+        outcomes(elsewhere, estimator),
         analyse(replace(study, methods=alone)),
     )
 
@@ -46,5 +50,6 @@ def beyond_metrics(results: BeyondResults) -> Tree:
         "choice": results.choices,
         "clips": results.clips,
         "imitation": results.others.imitation,
+        "tasks": results.tasks,
     }
     return {name: details(table) for name, table in tables.items()}

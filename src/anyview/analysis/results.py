@@ -51,7 +51,7 @@ def analyse(study: Study) -> Results:
     return Results(
         data=tidy(_data(study)),
         translation=tidy(_translation(study, estimator)),
-        imitation=tidy(_imitation(methods, estimator)),
+        imitation=outcomes(methods, estimator),
         more=tidy(_more(study, methods, estimator)),
         losses=losses,
         loss_points=curves.loss_points(losses),
@@ -66,6 +66,11 @@ def analyse(study: Study) -> Results:
         distances=distances(methods),
         real=tuple(cell for cell in study.translators if study.is_real(cell)),
     )
+
+
+def outcomes(methods: dict[str, EvaluatedMethod], estimator: Estimator) -> pd.DataFrame:
+    """Success, final distance and return table of methods, as ``estimates.tidy`` makes it."""
+    return tidy(_imitation(methods, estimator))
 
 
 def distances(methods: dict[str, EvaluatedMethod]) -> pd.DataFrame:

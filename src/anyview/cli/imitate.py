@@ -12,7 +12,7 @@ import typer
 def imitate(
     clip: Annotated[str, typer.Argument(help="The expert's clip: any video, or the name of a set's clip.")],
     model: Annotated[
-        Path | None,
+        str | None,
         typer.Option(
             "--model", help="A trained cell, or the folder of a model; without it the one that fits the clip."
         ),

@@ -15,12 +15,14 @@ from anyview.evaluation.runs import evaluate_group
 from anyview.evaluation.stage import RATE, draw_contexts
 from anyview.learners import ddpg
 from anyview.learners.common.policies import save_policies
-from anyview.pusher.batch import FRAMES, TOLERANCE
+from anyview.pusher.batch import FRAMES
 from anyview.pusher.contexts import COLOURS, Colour, Context
+from anyview.pusher.task import load_task
 from anyview.rewards.cells import make_reward
 from anyview.runtime.errors import AnyviewError
 from anyview.runtime.outputs import whole_folder, write_atomically
 from anyview.runtime.scratch import checkpoint_folder
+from anyview.sharing.checksums import find_model
 from anyview.translator.weights import read_meta
 from anyview.video.files import write_video
 from anyview.video.phases import frames_in_step, seconds_of
@@ -46,16 +48,17 @@ class Task:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Metres from where the object ends to each goal, by colour."""
+    """Metres that are left to each goal, by colour; less than ``tolerance`` is a success."""
 
     distances: dict[Colour, float]
     shown: Colour | None
+    tolerance: float
 
     @property
     def success(self) -> bool | None:
         """Whether the agent did it; None where there are two goals and nothing says which was meant."""
         goals = [self.shown] if self.shown else list(self.distances)
-        return self.distances[goals[0]] < TOLERANCE if len(goals) == 1 else None
+        return self.distances[goals[0]] < self.tolerance if len(goals) == 1 else None
 
     def __str__(self) -> str:
         told = " and ".join(
@@ -66,7 +69,7 @@ class Outcome:
 
 
 def prepare(
-    clip: str, model: Path | None, context: int | None, seed: int, episodes: int, output: Path
+    clip: str, model: str | None, context: int | None, seed: int, episodes: int, output: Path
 ) -> Task:
     """Check everything before the work starts. Raises AnyviewError if anything of it does not fit."""
     study = load_params()
@@ -78,7 +81,7 @@ def prepare(
     if model is None:
         folder = _fitting_model(study, stored.dataset if stored else study.imitation.dataset)
     else:
-        folder = model if model.is_dir() else paths.model(str(model))
+        folder = find_model(model)
     meta = read_meta(folder)
     if (dataset := meta.get("dataset")) not in study.demonstration_sets:
         sets = ", ".join(study.demonstration_sets)
@@ -129,12 +132,12 @@ def train(task: Task, output: Path) -> Outcome:
         write_atomically(folder / "curve.csv", result.curve.to_csv(index=False))
         write_video(folder / VIDEO, views.repeat(scale, axis=1).repeat(scale, axis=2), RATE, "AV1")
     shutil.rmtree(scratch)
-    ended = result.runs.iloc[0]
+    ended, tolerance = result.runs.iloc[0], load_task(context.task).tolerance
     if context.choice is None:
-        return Outcome({COLOURS[0]: float(ended["final_distance"])}, None)
+        return Outcome({COLOURS[0]: float(ended["final_distance"])}, None, tolerance)
     counted = context.choice.colour
     names = {True: "final_distance", False: "other_distance"}
-    return Outcome({each: float(ended[names[each == counted]]) for each in COLOURS}, task.shown)
+    return Outcome({each: float(ended[names[each == counted]]) for each in COLOURS}, task.shown, tolerance)
 
 
 def _fitting_model(params: Params, dataset: str) -> Path:
@@ -160,7 +163,7 @@ def _fitting_model(params: Params, dataset: str) -> Path:
 
 
 def _has_every_loss(weights: LossWeights) -> bool:
-    return all((weights.translation, weights.reconstruction, weights.alignment))
+    return min(weights.translation, weights.reconstruction, weights.alignment) > 0
 
 
 def _one_run(params: Params, model: Path, dataset: str, size: int, seed: int, episodes: int) -> Params:

@@ -13,14 +13,17 @@ from rich.console import Console
 
 from anyview.cli.clips import clips
 from anyview.cli.export import export
+from anyview.cli.export_policy import export_policy
 from anyview.cli.imitate import imitate
 from anyview.cli.record import record
 from anyview.cli.repro import repro
 from anyview.cli.review import review, sweep
+from anyview.cli.sharing import pull, push
 from anyview.cli.translate import translate
 from anyview.cli.watch import watch
 from anyview.runtime.errors import AnyviewError, exit_code
 
+_EXTRAS = {"pyarrow": "lerobot", "huggingface_hub": "share", "onnx": "share", "onnxruntime": "share"}
 _NOT_FIT = 1  # exit code: nothing was wrong with the input, but the answer is no
 
 app = typer.Typer(
@@ -140,6 +143,9 @@ for command in (
     translate,
     imitate,
     watch,
+    export_policy,
+    push,
+    pull,
     review,
     sweep,
     clean,
@@ -156,7 +162,8 @@ def _run() -> None:
     try:
         app(prog_name="anyview")
     except ModuleNotFoundError as error:
-        advice = "pip install 'anyview[lerobot]'" if error.name == "pyarrow" else "run `make setup`"
+        extra = _EXTRAS.get(error.name or "")
+        advice = f"pip install 'anyview[{extra}]'" if extra else "run `make setup`"
         raise AnyviewError(f"{error}; {advice}") from None
     except SystemExit as ended:
         if ended.code:

@@ -57,28 +57,30 @@ def repro(
     A stage may state `meta: {cores: 2, gpus: 1, memory: 4 GB}` in dvc.yaml. With ANYVIEW_BACKEND=ray,
     stages are tasks of the Ray cluster at RAY_ADDRESS.
     """
+    import joblib
+
     from anyview.parallel.durations import Durations
     from anyview.parallel.graph import collect, open_repository
 
     names, counts = _split_jobs(targets or [], jobs, plan)
+    here = counts or [joblib.cpu_count()]
     with open_repository() as repo:
         graph, stages = collect(repo, names)
         folder = Path(os.path.relpath(repo.tmp_dir)) / _FOLDER
         known = Durations(folder / "durations.json", stages)
         if plan:
-            _print_plan(graph, known, durations, counts, as_json)
+            _print_plan(graph, known, durations, here, as_json)
         elif dry:
-            _print_schedule(repo, graph, stages, known, counts[0], force, as_json)
+            _print_schedule(repo, graph, stages, known, here[0], force, as_json)
         else:
-            _run(repo, graph, stages, known, folder, counts[0], force, not keep_going, as_json)
+            count = counts[0] if counts else None
+            _run(repo, graph, stages, known, folder, count, force, not keep_going, as_json)
 
 
 def _split_jobs(targets: list[str], jobs: str, plan: bool) -> tuple[list[str], list[int]]:
     """Targets and numbers of cores: `--plan --jobs 1 2 8` reaches us as the job 1 and the targets 2 and 8."""
-    import joblib
-
     if not jobs:
-        return targets, [joblib.cpu_count()]
+        return targets, []
     names = [target for target in targets if not (plan and target.isdecimal())]
     counts = jobs.split(",") + [target for target in targets if target not in names]
     if not all(count.isascii() and count.isdecimal() and int(count) for count in counts):
@@ -94,11 +96,14 @@ def _run(
     stages: "dict[str, Stage]",
     known: "Durations",
     folder: Path,
-    cores: int,
+    jobs: int | None,
     force: bool,
     fail_fast: bool,
     as_json: bool,
 ) -> None:
+    import joblib
+
+    from anyview.parallel.graph import on_cores
     from anyview.parallel.needs import this_machine
     from anyview.parallel.repair import drop_broken_rwlock
     from anyview.parallel.run import Engine, log_of, orders, run
@@ -112,22 +117,17 @@ def _run(
     if os.environ.get("ANYVIEW_BACKEND", "local") == "ray":
         from anyview.parallel.cluster import Cluster
 
-        engine = Cluster()
+        engine = Cluster(jobs)
     else:
         from anyview.parallel.processes import Processes
 
-        machine = this_machine(cores)
+        machine = this_machine(jobs or joblib.cpu_count())
         for address, node in graph.items():
             machine.check(node.needs, address)
         engine = Processes(machine, stages)
+    graph = on_cores(graph, engine.largest)
     schedule, results = run(
-        graph,
-        orders(graph, stages, folder, cores, force),
-        engine,
-        known,
-        make_view(as_json),
-        cores,
-        fail_fast,
+        graph, orders(graph, stages, folder, force), engine, known, make_view(as_json), fail_fast
     )
     failed = schedule.of(State.FAILED, State.INTERRUPTED)
     if as_json:
@@ -136,12 +136,13 @@ def _run(
     elif schedule.of(State.UNCHANGED) == list(graph):
         print("Data and pipelines are up to date.")
     else:
-        counts = {state: len(schedule.of(state)) for state in (*DONE, State.FAILED)}
+        counts = {state: len(schedule.of(state)) for state in (*DONE, State.FAILED, State.INTERRUPTED)}
         print(", ".join(f"{count} {state}" for state, count in counts.items() if count))
         if skipped := schedule.of(State.SKIPPED):
             print(f"skipped: {some(skipped)}")
         for address in failed:
-            print(f"{address} failed: {results[address].message}; its log: cat '{log_of(folder, address)}'")
+            state, message = schedule.states[address], results[address].message
+            print(f"{address} {state}: {message}; its log: cat '{log_of(folder, address)}'")
     if failed:
         raise typer.Exit(_FAILED)
 

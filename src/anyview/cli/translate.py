@@ -6,8 +6,6 @@ from typing import Annotated
 
 import typer
 
-from anyview import paths
-
 
 def translate(
     clip: Annotated[str, typer.Argument(help="The expert's clip: any video, or the name of a set's clip.")],
@@ -15,7 +13,7 @@ def translate(
         Path,
         typer.Option("--context", help="The other view: a picture, or a video whose first frame is taken."),
     ],
-    model: Annotated[Path, typer.Option("--model", help="A trained cell, or the folder of a model.")],
+    model: Annotated[str, typer.Option("--model", help="A trained cell, or the folder of a model.")],
     output: Annotated[
         Path, typer.Option("--output", "-o", help="The AVI file to write (lossless FFV1).")
     ] = Path("translated.avi"),
@@ -30,12 +28,13 @@ def translate(
     from anyview.cli.footage import read_clip, read_view
     from anyview.runtime.device import torch_device
     from anyview.runtime.errors import AnyviewError
+    from anyview.sharing.checksums import find_model
     from anyview.translator.weights import load_translator
     from anyview.video.files import write_video
 
     if output.suffix != ".avi":
         raise AnyviewError(f"{output}: the output must end in .avi")
-    translator = load_translator(model if model.is_dir() else paths.model(str(model)))
+    translator = load_translator(find_model(model))
     frames, rate = read_clip(clip, translator.image_size)
     view = read_view(context, translator.image_size)
     translated = translate_clip(translator.to(torch_device()), frames, view)

@@ -1,1 +1,1 @@
-"""The task as Gymnasium environments, for other libraries."""
+"""The tasks as Gymnasium environments, for other libraries."""

@@ -1,11 +1,11 @@
-"""The pusher as Gymnasium environments: ``anyview/Pusher3DoF-v0``, single and vectorised.
+"""The tasks as Gymnasium environments, such as ``anyview/Pusher3DoF-v0``, single and vectorised.
 
-The reward here is the negative distance from object to goal in metres, for tests and baselines that know the
-true state; imitation replaces it with what the camera sees. Episodes are truncated after 49 actions.
+The reward here is the negative distance that is left to the goal in metres, for tests and baselines that know
+the true state; imitation replaces it with what the camera sees. Episodes are truncated after 49 actions.
 """
 
 from collections.abc import Sequence
-from typing import Any, get_args
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -16,21 +16,22 @@ from anyview.pusher.batch import (
     ACTION_SIZE,
     ACTIONS,
     OBSERVATION_LIMIT,
-    TOLERANCE,
     PusherBatch,
     finite_actions,
     observation_size,
 )
 from anyview.pusher.contexts import Context, Kind, sample_contexts
+from anyview.pusher.task import PUSH, load_task
 
 _METADATA = {"render_modes": ["rgb_array"], "render_fps": 10}
 _BEFORE_RESET = "the environment has no episode yet: call reset() first"
 
 
 class PusherEnv(gym.Env):
-    """One pusher. A reset draws a new context of ``kind``, unless ``context`` fixes it.
+    """One arm at a ``task``. A reset draws a new context of ``kind``, unless ``context`` fixes it.
 
-    Raises ValueError where an argument, an option or an action is not what it has to be.
+    Raises ValueError where an argument, an option or an action is not what it has to be, and AnyviewError if
+    there is no such task.
     """
 
     metadata: dict[str, Any] = _METADATA
@@ -42,12 +43,14 @@ class PusherEnv(gym.Env):
         control: str = "twist",
         image_size: int = 64,
         render_mode: str | None = None,
+        task: str = PUSH,
     ):
-        _check_choices(kind, control)
+        _check_choices(task, kind, control)
         self.render_mode = render_mode
-        self._context = None if context is None else _checked_context(context)
+        self._task = task
+        self._context = None if context is None else _checked_context(context, task)
         self._goals = _goals([] if context is None else [context], kind)
-        self.observation_space, self.action_space = _spaces(self._goals)
+        self.observation_space, self.action_space = _spaces(task, self._goals)
         self._kind, self._control, self._image_size = kind, control, image_size
         self._batch: PusherBatch | None = None
 
@@ -55,10 +58,11 @@ class PusherEnv(gym.Env):
         """Start an episode; ``options={"context": ...}`` chooses its context."""
         super().reset(seed=seed)
         _check_options(options, "context")
-        context = _checked_context(options["context"], self._goals) if options else self._context
-        self._batch = PusherBatch(
-            [context or _draw(self.np_random, self._kind)], self._control, self._image_size
-        )
+        context = self._context
+        if options:
+            context = _checked_context(options["context"], self._task, self._goals)
+        drawn = [context or _draw(self.np_random, self._kind, self._task)]
+        self._batch = PusherBatch(drawn, self._control, self._image_size)
         return self._batch.reset()[0], _info(self._batch, 0)
 
     def step(self, action: np.ndarray):
@@ -79,7 +83,7 @@ class PusherEnv(gym.Env):
 
 
 class PusherVectorEnv(VectorEnv):
-    """``num_envs`` pushers on one ``mujoco.batch.Batch``, equal step for step to as many single ones.
+    """``num_envs`` arms at a ``task`` on one ``mujoco.batch.Batch``, equal step for step to single ones.
 
     Raises ValueError where an argument, an option or an action is not what it has to be.
     """
@@ -94,13 +98,16 @@ class PusherVectorEnv(VectorEnv):
         control: str = "twist",
         image_size: int = 64,
         render_mode: str | None = None,
+        task: str = PUSH,
     ):
         if contexts is not None and len(contexts) != num_envs:
             raise ValueError(f"{len(contexts)} contexts for {num_envs} environments")
-        _check_choices(kind, control)
+        _check_choices(task, kind, control)
         self.num_envs = num_envs
-        self._contexts = None if contexts is None else [_checked_context(context) for context in contexts]
-        self.single_observation_space, self.single_action_space = _spaces(_goals(self._contexts or [], kind))
+        self._task = task
+        self._contexts = None if contexts is None else [_checked_context(each, task) for each in contexts]
+        goals = _goals(self._contexts or [], kind)
+        self.single_observation_space, self.single_action_space = _spaces(task, goals)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.render_mode = render_mode
@@ -118,7 +125,7 @@ class PusherVectorEnv(VectorEnv):
             if isinstance(seed, Sequence):
                 seeds = list(seed)
             self._generators = [gym.utils.seeding.np_random(each)[0] for each in seeds]  # type: ignore[arg-type]
-        contexts = self._contexts or [_draw(generator, self._kind) for generator in self._generators]
+        contexts = self._contexts or [_draw(each, self._kind, self._task) for each in self._generators]
         self._batch = PusherBatch(contexts, self._control, self._image_size)
         return self._batch.reset(), self._info()
 
@@ -152,7 +159,7 @@ class PusherVectorEnv(VectorEnv):
         return {
             "distance": distance,
             "_distance": everywhere,
-            "is_success": distance < TOLERANCE,
+            "is_success": distance < self._batch.task.tolerance,
             "_is_success": everywhere.copy(),
         }
 
@@ -165,29 +172,31 @@ def _goals(contexts: Sequence[Context], kind: str) -> int:
     return counts.pop()
 
 
-def _spaces(goals: int) -> tuple[gym.spaces.Box, gym.spaces.Box]:
+def _spaces(task: str, goals: int) -> tuple[gym.spaces.Box, gym.spaces.Box]:
     """The spaces of observations and actions, new for each environment: a space has a random generator."""
-    shape = (observation_size(goals),)
+    shape = (observation_size(task, goals),)
     observations = gym.spaces.Box(-OBSERVATION_LIMIT, OBSERVATION_LIMIT, shape, np.float32)
     return observations, gym.spaces.Box(-1.0, 1.0, (ACTION_SIZE,), np.float32)
 
 
-def _draw(rng: np.random.Generator, kind: Kind) -> Context:
-    return sample_contexts(rng, 1, kind)[0][0]
+def _draw(rng: np.random.Generator, kind: Kind, task: str) -> Context:
+    return sample_contexts(rng, 1, kind, task)[0][0]
 
 
-def _check_choices(kind: str, control: str) -> None:
+def _check_choices(task: str, kind: str, control: str) -> None:
     for name, value, choices in (
-        ("kind", kind, get_args(Kind)),
+        ("kind", kind, load_task(task).kinds),
         ("control", control, ("twist", "torque")),
     ):
         if value not in choices:
             raise ValueError(f"{name} {value!r}: must be {' or '.join(choices)}")
 
 
-def _checked_context(context: Any, goals: int | None = None) -> Context:
+def _checked_context(context: Any, task: str, goals: int | None = None) -> Context:
     if not isinstance(context, Context):
         raise ValueError(f"context: expected a Context (see anyview.pusher.contexts), got {context!r}")
+    if context.task != task:
+        raise ValueError(f"context: it is one of task {context.task}, but the environment is for {task}")
     if goals is not None and len(context.goals) != goals:
         raise ValueError(f"context: it has {len(context.goals)} goals, but the environment is for {goals}")
     return context
@@ -201,4 +210,4 @@ def _check_options(options: dict[str, Any] | None, *known: str) -> None:
 
 def _info(batch: PusherBatch, index: int) -> dict[str, Any]:
     distance = float(batch.distance()[index])
-    return {"distance": distance, "is_success": distance < TOLERANCE}
+    return {"distance": distance, "is_success": distance < batch.task.tolerance}

@@ -11,11 +11,12 @@ import pandas as pd
 from anyview.config import Params
 from anyview.evaluation.methods import Group, Method, Scoring
 from anyview.learners.common.interfaces import Arrays, Learner, RewardSource
-from anyview.pusher.batch import FRAMES, TOLERANCE, PusherBatch, observation_size
+from anyview.pusher.batch import FRAMES, PusherBatch, observation_size
 from anyview.pusher.contexts import Context
 from anyview.pusher.episodes import Act, Moment, episode, film
 from anyview.pusher.expert import roll_out
 from anyview.pusher.render import renderer
+from anyview.pusher.task import load_task
 from anyview.runtime.checkpoints import Checkpoints
 from anyview.runtime.device import use_threads
 from anyview.runtime.progress import track
@@ -65,7 +66,8 @@ def evaluate_group(
     positions, _ = roll_out(contexts)
     own = _film(params, contexts, positions)
     group = Group(params, params.methods[name], runs, contexts, demonstrations, own)
-    learner = method.make_learner(params, runs, observation_size(len(contexts[0].goals)))
+    task, goals = contexts[0].task, len(contexts[0].goals)
+    learner = method.make_learner(params, runs, observation_size(task, goals))
     scoring = method.make_reward(group)
     label = f"{name}, runs {runs[0]} to {runs[-1]}" if len(runs) > 1 else name
     curve = _train(label, group, learner, scoring, Checkpoints(scratch))
@@ -73,18 +75,18 @@ def evaluate_group(
     agent, distance, other = _perform(group, learner)
     columns = {
         "run": list(runs),
-        "success": (distance < TOLERANCE).astype(int),
+        "success": (distance < load_task(task).tolerance).astype(int),
         "final_distance": distance,
         "return_policy": _returns(scoring, agent),
     }
     if other is not None:
         columns["other_distance"] = other
     if scoring.fixed:
-        without_object = positions.copy()
-        without_object[:, :, 3:] = positions[:, :1, 3:]
+        arm_alone = positions.copy()
+        arm_alone[:, :, 3:] = positions[:, :1, 3:]
         columns |= {
             "return_still": _returns(scoring, np.repeat(own[:, :1], FRAMES, axis=1)),
-            "return_arm_only": _returns(scoring, _film(params, contexts, without_object)),
+            "return_arm_only": _returns(scoring, _film(params, contexts, arm_alone)),
             "return_expert": _returns(scoring, own),
         }
     rollouts = np.concatenate([agent, scoring.shown], axis=3)
@@ -123,7 +125,7 @@ def _train(
             note = ""
             if iteration in points:
                 distance = _final_distance(testing, learner)
-                note = f"object {100 * np.median(distance):.1f} cm from the goal"
+                note = f"{100 * np.median(distance):.1f} cm from the goal"
                 means = {key: np.mean([each[key] for each in since], axis=0) for key in since[0]}
                 for row, run in enumerate(group.runs):
                     measures = {key: float(mean[row]) for key, mean in means.items()}
@@ -168,7 +170,7 @@ def explore(batch: PusherBatch, learner: Learner, reward: RewardSource, runs: in
 
 
 def _final_distance(batch: PusherBatch, learner: Learner) -> np.ndarray:
-    """Metres (R,) from object to goal after an episode without noise."""
+    """Metres (R,) that are left to the goal after an episode without noise."""
     for _ in episode(batch, _greedy(learner)):
         pass
     return batch.distance()
@@ -196,8 +198,8 @@ def _returns(scoring: Scoring, clips: np.ndarray) -> np.ndarray:
 
 
 def _film(params: Params, contexts: Sequence[Context], positions: np.ndarray) -> np.ndarray:
-    """Frames (R, 50, H, W, 3) of ``positions`` (R, 50, 5)."""
-    camera = renderer(params.sim.image_size)
+    """Frames (R, 50, H, W, 3) of ``positions`` (R, 50, 3 + 2 k)."""
+    camera = renderer(contexts[0].task, params.sim.image_size)
     return np.stack([camera.render_clip(*each) for each in zip(contexts, positions, strict=True)])
 
 

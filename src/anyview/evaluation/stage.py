@@ -96,7 +96,8 @@ def draw_contexts(params: Params, name: str, count: int) -> list[Context]:
     """``count`` contexts to act in, with as many goals as the clips have, from the random stream ``name``."""
     kind: Kind = "choice" if two_goals(params) else "diverse"
     rng = stream(params.base.seed, name if kind == "diverse" else f"{name}/{kind}")
-    return sample_contexts(rng, count, kind)[0]
+    task = params.demonstration_sets[params.imitation.dataset].task
+    return sample_contexts(rng, count, kind, task)[0]
 
 
 def _imitated(name: str, params: Params) -> list[tuple[Colour | None, list[Context], Clips]]:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from anyview.parallel.graph import Node
+from anyview.parallel.needs import Machine, Needs
 from anyview.parallel.schedule import State
 from anyview.parallel.stage import GRACE_SECONDS, Order, Result, read_result
 from anyview.runtime.workers import RETRIES, connect_to_ray
@@ -20,17 +21,23 @@ from anyview.runtime.workers import RETRIES, connect_to_ray
 class Cluster:
     """Runs orders as tasks with the resources that their stages state."""
 
-    def __init__(self) -> None:
+    def __init__(self, jobs: int | None) -> None:
+        """Of the cluster, stages use ``jobs`` cores together, or all of them."""
         self._ray = connect_to_ray()
-        self._running: dict[Any, str] = {}
+        cores = [int(node["Resources"].get("CPU", 0)) for node in self._ray.nodes() if node["Alive"]]
+        self.cores = jobs or sum(cores)
+        self.largest = min(max(cores), self.cores)
+        self._allowed = Machine(jobs or sys.maxsize)
+        self._running: dict[Any, Node] = {}
 
     def fits(self, node: Node) -> bool:
-        """Always: Ray keeps tasks until there is room."""
-        return True
+        """Whether ``jobs`` allow ``node`` now. Ray keeps what it is given until a node has room."""
+        return self._allowed.fits(Needs(node.needs.cores))
 
     def start(self, node: Node, order: Order) -> None:
         """Hand ``order`` to Ray."""
         needs = node.needs
+        self._allowed.take(Needs(needs.cores))
         task = self._ray.remote(
             num_cpus=needs.cores, num_gpus=needs.gpus, memory=needs.memory or None, max_retries=RETRIES
         )(_perform)
@@ -39,7 +46,7 @@ class Cluster:
         reference = task.options(name=node.address).remote(
             json.dumps(asdict(order)), os.getcwd(), dict(os.environ)
         )
-        self._running[reference] = node.address
+        self._running[reference] = node
 
     def wait(self, seconds: float) -> list[Result]:
         """Results of stages that end within ``seconds``; returns at the first."""
@@ -58,11 +65,12 @@ class Cluster:
         self._running.clear()
 
     def _end(self, reference: Any) -> Result:
-        address = self._running.pop(reference)
+        node = self._running.pop(reference)
+        self._allowed.give(Needs(node.needs.cores), ())
         try:
             return read_result(self._ray.get(reference))
         except self._ray.exceptions.RayError as error:
-            return Result(address, State.FAILED, message=f"Ray: {str(error).strip().splitlines()[-1]}")
+            return Result(node.address, State.FAILED, message=f"Ray: {str(error).strip().splitlines()[-1]}")
 
 
 def _perform(order: str, folder: str, environment: dict[str, str]) -> bytes:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from anyview.parallel.needs import Needs, read_needs
@@ -61,6 +61,11 @@ def collect(repo: "Repo", targets: Sequence[str] = ()) -> "tuple[Graph, dict[str
             for address, stage in stages.items()
         }
     return graph, stages
+
+
+def on_cores(graph: Graph, cores: int) -> Graph:
+    """``graph`` where a stage can have ``cores`` cores at most."""
+    return {address: replace(node, needs=node.needs.on(cores)) for address, node in graph.items()}
 
 
 def _keep_config(repo: "Repo") -> None:

@@ -26,6 +26,7 @@ class Processes:
 
     def __init__(self, machine: Machine, stages: "Mapping[str, Stage]"):
         self.machine, self._stages = machine, stages
+        self.cores = self.largest = machine.cores
         self._lifeline = os.pipe()
         gc.freeze()  # what is here now is shared with every fork: a collection there would copy it
         self._running: dict[str, tuple[Node, tuple[str, ...], BaseProcess, Connection]] = {}

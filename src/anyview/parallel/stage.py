@@ -140,7 +140,8 @@ def reproduce(stage: "Stage", order: Order) -> Result:
                 print(f"waiting: {error}", flush=True)
                 time.sleep(_BUSY_SECONDS)
     except _Stopped:
-        return Result(order.address, State.INTERRUPTED)
+        told = "ended by SIGTERM; run the same command again to continue"
+        return Result(order.address, State.INTERRUPTED, message=told)
     except Exception as error:
         logging.getLogger("dvc").error("failed to reproduce '%s': %s", order.address, error)
         return Result(order.address, State.FAILED, lock.away, " ".join(str(error).split()))

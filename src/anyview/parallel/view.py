@@ -18,6 +18,7 @@ from anyview.parallel.stage import Result
 _LOG_SECONDS = 60.0
 _JSON_SECONDS = 1.0
 _LIVE_SECONDS = 0.4
+_BAR = 16  # characters
 _NAMED = 3  # stages named in a row, before "and 4 more"
 
 
@@ -76,7 +77,7 @@ def headline(moment: Moment) -> str:
     )
     if moment.unmeasured:
         least = f"at least {clock(moment.left)} and " if moment.left else ""
-        return f"{text}; left: {least}{moment.unmeasured} stages that were never measured"
+        return f"{text}; left: {least}{moment.unmeasured} stages never measured"
     return f"{text}; {clock(moment.left)} left by the critical path"
 
 
@@ -98,7 +99,7 @@ class PlainView:
     def ended(self, result: Result, skipped: Sequence[str]) -> None:
         print(ending(result), flush=True)
         for address in skipped:
-            print(f"{address}: skipped, because {result.address} failed", flush=True)
+            print(f"{address}: skipped, because {result.address} did not finish", flush=True)
 
     def tick(self, look: Callable[[], Moment]) -> None:
         if time.monotonic() - self._shown < _LOG_SECONDS:
@@ -106,7 +107,8 @@ class PlainView:
         self._shown = time.monotonic()
         moment = look()
         for address, (_, progress) in moment.running.items():
-            print(f"{address}: {_progress(progress)}", flush=True)
+            said = ", ".join(part for part in _parts(progress) if part)
+            print(f"{address}: {said or 'running'}", flush=True)
         print(headline(moment), flush=True)
 
     def close(self) -> None:
@@ -180,29 +182,48 @@ class LiveView:
             return
         self._shown = time.monotonic()
         moment = look()
-        table = Table.grid(padding=(0, 2))
-        for address, (elapsed, progress) in moment.running.items():
-            table.add_row(Text(address), _bar(progress.fraction), clock(elapsed), Text(_progress(progress)))
         room = max(self._console.size.height - len(moment.running) - 3, 0)
-        waiting = Table.grid(padding=(0, 2))
-        for address, upstream in list(moment.waiting.items())[:room]:
-            waiting.add_row(
-                Text(address, style="dim"), Text(f"waits for {some(upstream) or 'room'}", style="dim")
-            )
-        self._live.update(Group(table, waiting, Text(headline(moment), style="bold")), refresh=True)
+        waiting = [Text(line, "dim", no_wrap=True, overflow="ellipsis") for line in _waiting(moment)[:room]]
+        whole = Text(headline(moment), "bold")
+        self._live.update(Group(self._running(moment), *waiting, whole), refresh=True)
+
+    def _running(self, moment: Moment) -> Table:
+        """A line a stage, however narrow the terminal is."""
+        table = Table.grid(padding=(0, 1), expand=True)
+        table.add_column(no_wrap=True, overflow="ellipsis", max_width=self._console.width // 3)
+        table.add_column(width=_BAR)
+        for _ in ("elapsed", "fraction", "left"):
+            table.add_column(no_wrap=True, justify="right")
+        table.add_column(no_wrap=True, overflow="ellipsis", ratio=1)
+        for address, (elapsed, progress) in moment.running.items():
+            fraction, left, said = _parts(progress)
+            bar = _bar(progress.fraction)
+            table.add_row(Text(address), bar, clock(elapsed), fraction, left, Text(f" {said}", "dim"))
+        return table
 
     def close(self) -> None:
         self._live.stop()
 
 
-def _progress(progress: Progress) -> str:
+def _waiting(moment: Moment) -> list[str]:
+    """A line for all stages that wait for the same."""
+    together: dict[tuple[str, ...], list[str]] = {}
+    for address, upstream in moment.waiting.items():
+        together.setdefault(tuple(upstream), []).append(address)
+    return [
+        f"{some(addresses)} {'wait' if len(addresses) > 1 else 'waits'} for {some(upstream) or 'room'}"
+        for upstream, addresses in together.items()
+    ]
+
+
+def _parts(progress: Progress) -> tuple[str, str, str]:
     fraction = "" if progress.fraction is None else f"{100 * progress.fraction:.0f}%"
     left = "" if progress.left is None else f"{clock(progress.left)} left"
-    return ", ".join(part for part in (fraction, left, progress.said) if part) or "running"
+    return fraction, left, progress.said
 
 
-def _bar(fraction: float | None, width: int = 20) -> str:
+def _bar(fraction: float | None) -> str:
     if fraction is None:
-        return "·" * width
-    full = round(fraction * width)
-    return "█" * full + "░" * (width - full)
+        return "·" * _BAR
+    full = round(fraction * _BAR)
+    return "█" * full + "░" * (_BAR - full)

@@ -1,4 +1,4 @@
-"""The planar pusher: scene, contexts, camera and the scripted expert."""
+"""The simulated world of every task: arm and table, contexts, camera and the scripted expert."""
 
 from anyview.runtime.graphics import load_mujoco
 

@@ -1,4 +1,4 @@
-"""N pushers side by side on ``mujoco.batch``: physics, observations and frames of many contexts at once."""
+"""N arms side by side on ``mujoco.batch``: physics, observations and frames of many contexts at once."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -19,14 +19,13 @@ from anyview.pusher.scene import (
     MAX_JOINT_SPEED,
     MAX_TORQUE,
     SUBSTEPS,
-    model,
 )
+from anyview.pusher.task import load_task
 from anyview.trigonometry import unit_vector
 
 ACTION_SIZE = 3
-OBSERVATION_SIZE = 15  # with one goal; a second one adds its place
+OBSERVATION_SIZE = 13  # with one goal and no object; another goal, and each object, adds its place
 OBSERVATION_LIMIT = 3.0  # entries are clipped to this; a normal episode stays within about 1
-TOLERANCE = 0.02  # metres from object to goal in the last frame: success
 MAX_TWIST = np.array([0.9, 0.9, 3.0])  # m/s, m/s, rad/s at action 1
 
 __all__ = [
@@ -36,7 +35,6 @@ __all__ = [
     "MAX_TWIST",
     "OBSERVATION_LIMIT",
     "OBSERVATION_SIZE",
-    "TOLERANCE",
     "PusherBatch",
     "finite_actions",
     "observation_size",
@@ -44,34 +42,37 @@ __all__ = [
 
 
 class PusherBatch:
-    """``len(contexts)`` pushers. An episode is a reset and ``ACTIONS`` steps, the same for all of them.
+    """``len(contexts)`` arms. An episode is a reset and ``ACTIONS`` steps, the same for all of them.
 
-    All contexts have one goal, or all have two.
+    All contexts are of one task, and all have one goal or all have two.
     """
 
     def __init__(self, contexts: Sequence[Context], control: str = "twist", image_size: int = 64):
         self.contexts = list(contexts)
         self.count = len(self.contexts)
+        self.task = load_task(self.contexts[0].task)
         self.steps = 0
         self._control = control
         self._image_size = image_size
         self._start = np.array([[*c.arm_qpos, *c.object_xy] for c in self.contexts])
         self._goal = np.array([c.goal_xy for c in self.contexts])
         self._goals = np.array([c.goals for c in self.contexts])
-        self._batch = mujoco.batch.Batch(model(control), nsim=self.count, nthread=1)
+        self._batch = mujoco.batch.Batch(self.task.model(control), nsim=self.count, nthread=1)
         self._qpos, self._qvel, self._ctrl = (self._batch.bind(name) for name in ("qpos", "qvel", "ctrl"))
+        self._past: list[np.ndarray] = []  # positions since the start, which the distance may depend on
 
     def __reduce__(self) -> tuple[Any, ...]:
         # MuJoCo's batch can be neither copied nor pickled. All that its next step depends on is one array.
         state = self._batch.state.copy()
-        return _continued, (self.contexts, self._control, self._image_size, self.steps, state)
+        return _continued, (self.contexts, self._control, self._image_size, self.steps, self._past, state)
 
     def reset(self) -> np.ndarray:
-        """Put every pusher at its context's start; observations (N, O)."""
+        """Put every arm at its context's start; observations (N, O)."""
         self._batch.reset()
         self._qpos[:] = self._start
         self._qvel[:] = 0
         self.steps = 0
+        self._past = [self.positions()]
         return self.observations()
 
     def step(self, actions: np.ndarray) -> np.ndarray:
@@ -85,7 +86,7 @@ class PusherBatch:
         else:
             twist = actions * MAX_TWIST
             tool = tool_pose(self._qpos[:, :3])[:, :2]
-            target = within_workspace(tool + CONTROL_SECONDS * twist[:, :2])
+            target = within_workspace(tool + CONTROL_SECONDS * twist[:, :2], self.task.workspace)
             twist[:, :2] = (target - tool) / CONTROL_SECONDS
             speed = joint_velocity(self._qpos[:, :3], twist)
             # Slow all joints alike, so that the tool keeps its direction.
@@ -93,12 +94,13 @@ class PusherBatch:
             self._ctrl[:] = speed / np.maximum(excess, 1)
         self._batch.step(nstep=SUBSTEPS)
         self.steps += 1
+        self._past.append(self.positions())
         return self.observations()
 
     def observations(self) -> np.ndarray:
         """(N, O) float32, each entry about in [-1, 1], O is ``observation_size``.
 
-        Joint angles (3) and speeds (3), tool position (2) and heading as sine and cosine (2), object (2),
+        Joint angles (3) and speeds (3), tool position (2) and heading as sine and cosine (2), objects (2 k),
         goal (2), or both goals in the order of ``COLOURS`` (4), time (1).
         """
         joints = self._qpos[:, :3]
@@ -108,43 +110,49 @@ class PusherBatch:
             self._qvel[:, :3] / MAX_JOINT_SPEED,
             _in_arena(tool[:, :2]),
             unit_vector(tool[:, 2])[:, ::-1],
-            _in_arena(self._qpos[:, 3:]),
+            _in_arena(self._qpos[:, 3:].reshape(self.count, -1, 2)).reshape(self.count, -1),
             _in_arena(self._goals).reshape(self.count, -1),
             np.full((self.count, 1), 2 * self.steps / ACTIONS - 1),
         ]
         return np.concatenate(parts, axis=-1).clip(-OBSERVATION_LIMIT, OBSERVATION_LIMIT).astype(np.float32)
 
     def positions(self) -> np.ndarray:
-        """Joint angles and object position (N, 5), as ``render`` takes them."""
+        """Joint angles and places of the k objects (N, 3 + 2 k), as ``render`` takes them."""
         return self._qpos.copy()
 
     def distance(self) -> np.ndarray:
-        """Metres (N,) from the object's centre to the goal's."""
-        return np.linalg.norm(self._qpos[:, 3:] - self._goal, axis=-1)
+        """Metres (N,) that are left to the goal, by the measure of the task."""
+        return self.task.distance(np.stack(self._past, axis=1), self._goal)
 
     def other_distance(self) -> np.ndarray:
-        """Metres (N,) from the object's centre to the goal that does not count, where there are two."""
+        """The same to the goal that does not count, where there are two."""
         others = np.array([c.choice.other_xy for c in self.contexts if c.choice is not None])
-        return np.linalg.norm(self._qpos[:, 3:] - others, axis=-1)
+        return self.task.distance(np.stack(self._past, axis=1), others)
 
     def render(self) -> np.ndarray:
         """What each context's camera sees: (N, H, W, 3) uint8 RGB."""
-        return renderer(self._image_size).render(self.contexts, self._qpos)
+        return renderer(self.contexts[0].task, self._image_size).render(self.contexts, self._qpos)
 
 
 def _continued(
-    contexts: list[Context], control: str, image_size: int, steps: int, state: np.ndarray
+    contexts: list[Context],
+    control: str,
+    image_size: int,
+    steps: int,
+    past: list[np.ndarray],
+    state: np.ndarray,
 ) -> PusherBatch:
     """A batch whose episode goes on after ``steps`` steps from MuJoCo's ``state`` (N, its size)."""
     pushers = PusherBatch(contexts, control, image_size)
     pushers.steps = steps
+    pushers._past = list(past)
     pushers._batch.state[:] = state
     return pushers
 
 
-def observation_size(goals: int) -> int:
-    """Entries of an observation where there are one or two ``goals``."""
-    return OBSERVATION_SIZE + 2 * (goals - 1)
+def observation_size(task: str, goals: int) -> int:
+    """Entries of an observation in ``task`` where there are one or two ``goals``."""
+    return OBSERVATION_SIZE + 2 * len(load_task(task).objects) + 2 * (goals - 1)
 
 
 def finite_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:

@@ -12,21 +12,21 @@ from anyview.pusher.batch import MAX_TWIST, PusherBatch
 from anyview.pusher.contexts import Context
 from anyview.pusher.episodes import Moment, episode
 from anyview.pusher.kinematics import tool_pose, wrap
-from anyview.pusher.path import expert_poses
 from anyview.pusher.scene import CONTROL_SECONDS
 
 
 def roll_out(contexts: Sequence[Context]) -> tuple[np.ndarray, np.ndarray]:
     """Run the expert in every context.
 
-    Returns positions (N, 50, 5) as ``Renderer`` takes them and final distances (N,) in metres, rounded to 6
-    decimals.
+    Returns positions (N, 50, 3 + 2 k) as ``Renderer`` takes them and final distances (N,) in metres, rounded
+    to 6 decimals.
     """
     batch = PusherBatch(contexts)
     batch.reset()
     start = batch.positions()
     goal = np.array([c.goal_xy for c in contexts])
-    reference = expert_poses(start[:, :3], start[:, 3:], goal)
+    objects = start[:, 3:].reshape(len(contexts), -1, 2)
+    reference = batch.task.expert_poses(start[:, :3], objects, goal)
 
     def act(now: Moment) -> np.ndarray:
         # Aim at where the path will be after this action: feed-forward and feedback in one.

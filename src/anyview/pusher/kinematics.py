@@ -9,7 +9,7 @@ sum in another order on another processor.
 
 import numpy as np
 
-from anyview.pusher.scene import ARENA_CENTRE, JOINT_RANGE, LINK, WORKSPACE_RADIUS
+from anyview.pusher.scene import ARENA_CENTRE, JOINT_RANGE, LINK
 from anyview.trigonometry import angle_of, unit_vector
 
 
@@ -32,13 +32,13 @@ def jacobian(joints: np.ndarray) -> np.ndarray:
     return np.stack([-outward[..., 1], outward[..., 0]], axis=-2)
 
 
-def within_workspace(position: np.ndarray) -> np.ndarray:
+def within_workspace(position: np.ndarray, radius: float) -> np.ndarray:
     """``position`` (..., 2), or the nearest point (..., 2) of the workspace where it lies outside."""
     offset = position - ARENA_CENTRE
     distance = np.linalg.norm(offset, axis=-1, keepdims=True)
     return np.where(
-        distance > WORKSPACE_RADIUS,
-        ARENA_CENTRE + offset * (WORKSPACE_RADIUS / distance.clip(1e-9)),
+        distance > radius,
+        ARENA_CENTRE + offset * (radius / distance.clip(1e-9)),
         position,
     )
 

@@ -20,20 +20,20 @@ from anyview.pusher.scene import (
     CAMERA_ELEVATION,
     DISTRACTORS,
     GOAL_COLOURS,
-    model,
 )
+from anyview.pusher.task import load_task
 
 _SUPERSAMPLING = 2
 _OFF = ("mjRND_SHADOW", "mjRND_REFLECTION", "mjRND_SKYBOX", "mjRND_HAZE", "mjRND_ADDITIVE", "mjRND_FOG")
 
 
 class Renderer:
-    """Renders square frames of one size. Use ``renderer(image_size)``, which shares one a thread."""
+    """Renders square frames of one task and size. Use ``renderer``, which shares one a thread."""
 
-    def __init__(self, image_size: int):
+    def __init__(self, task: str, image_size: int):
         self._size = image_size
         pixels = image_size * _SUPERSAMPLING
-        self._model = copy.copy(model("twist"))
+        self._model = copy.copy(load_task(task).model("twist"))
         self._model.vis.global_.offwidth = self._model.vis.global_.offheight = pixels
         self._data = mujoco.MjData(self._model)
         self._gl = mujoco.GLContext(pixels, pixels)
@@ -54,9 +54,9 @@ class Renderer:
         self._distractors = [self._model.geom(f"distractor{i}").id for i in range(DISTRACTORS)]
 
     def render(self, contexts: Sequence[Context], positions: np.ndarray) -> np.ndarray:
-        """Frames (N, size, size, 3) uint8 RGB of ``contexts``, arm and object at ``positions`` (N, 5).
+        """Frames (N, size, size, 3) uint8 RGB of ``contexts``, with arm and objects at ``positions``.
 
-        A position is three joint angles in radians, then the object's x and y in metres.
+        These are (N, 3 + 2 k): three joint angles in radians, then x and y of each object in metres.
         """
         self._gl.make_current()
         frames = np.empty((len(contexts), self._size, self._size, 3), np.uint8)
@@ -66,7 +66,7 @@ class Renderer:
         return frames
 
     def render_clip(self, context: Context, positions: np.ndarray) -> np.ndarray:
-        """Frames (T, size, size, 3) of one context along ``positions`` (T, 5)."""
+        """Frames (T, size, size, 3) of one context along ``positions`` (T, 3 + 2 k)."""
         self._gl.make_current()
         frames = np.empty((len(positions), self._size, self._size, 3), np.uint8)
         self._dress(context)
@@ -101,14 +101,14 @@ class _Renderers(threading.local):
     """Each thread's renderers: an OpenGL context belongs to the thread that made it."""
 
     def __init__(self) -> None:
-        self.by_size: dict[int, Renderer] = {}
+        self.made: dict[tuple[str, int], Renderer] = {}
 
 
 _renderers = _Renderers()
 
 
-def renderer(image_size: int) -> Renderer:
-    """This thread's renderer for ``image_size``."""
-    if image_size not in _renderers.by_size:
-        _renderers.by_size[image_size] = Renderer(image_size)
-    return _renderers.by_size[image_size]
+def renderer(task: str, image_size: int) -> Renderer:
+    """This thread's renderer of ``task`` for ``image_size``."""
+    if (task, image_size) not in _renderers.made:
+        _renderers.made[task, image_size] = Renderer(task, image_size)
+    return _renderers.made[task, image_size]

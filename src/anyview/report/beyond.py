@@ -13,11 +13,13 @@ from anyview.analysis.cells import HUMAN, label
 from anyview.analysis.choice import CHOICE, choosing
 from anyview.analysis.clips import curves
 from anyview.analysis.study import EvaluatedMethod, SimulatedSet, Study
+from anyview.analysis.tasks import by_task
 from anyview.report.figures import choice, clips
 from anyview.report.figures.style import to_svg
 from anyview.report.formatting import centimetres
 from anyview.report.illustrations import Illustrations, typical_strip
 from anyview.report.pictures import Clip, Strip, animated_webp, label_view, make_clip, make_strip
+from anyview.report.tasks import task_rollouts, task_strips
 from anyview.report.text import by_cell, environment
 from anyview.video.phases import frames_in_step, seconds_of
 from anyview.video.pictures import resize
@@ -40,8 +42,10 @@ def illustrate_beyond(study: Study, results: BeyondResults) -> Illustrations:
         moving["clip-decides"] = clip_decides(both)
     if (strip := hand_to_robot(study)) is not None:
         strips["hand-to-robot"] = strip
-    rollouts = dict(_rollouts(study))
-    return Illustrations(figures, strips, {"rollouts": rollouts} if rollouts else {}, moving)
+    strips |= dict(task_strips(study))
+    players = {"rollouts": dict(_rollouts(study)), "task-rollouts": dict(task_rollouts(study))}
+    shown = {name: titled for name, titled in players.items() if titled}
+    return Illustrations(figures, strips, shown, moving)
 
 
 class Shown(NamedTuple):
@@ -127,6 +131,8 @@ def write_beyond(
             frames_of=partial(_frames_of, study),
             imitation=by_cell(results.others.imitation),
             differences={row.cell: row for row in results.others.differences.itertuples()},
+            tasks={task: list(methods) for task, methods in by_task(study).items()},
+            outcomes=by_cell(results.tasks),
         )
     )
     return re.sub(r"\n{3,}", "\n\n", written).strip() + "\n"

@@ -8,7 +8,7 @@ import numpy as np
 from anyview.analysis.cells import ADAM, AUGMENTED, OURS, SIM, ablated, compared, in_order, label
 from anyview.analysis.curves import PUBLISHED
 from anyview.analysis.results import Results
-from anyview.analysis.study import AssessedTranslator, Study
+from anyview.analysis.study import AssessedTranslator, EvaluatedMethod, SimulatedSet, Study
 from anyview.report.figures import imitation, translation
 from anyview.report.figures.style import to_svg
 from anyview.report.formatting import centimetres
@@ -45,9 +45,13 @@ def idea_strip(study: Study) -> Strip | None:
     """Expert, translated and agent frames of a run of `ours`: the one of median final distance."""
     if OURS not in study.methods or "diverse" not in study.simulated:
         return None
-    ours = study.methods[OURS]
-    agent, translated = np.split(ours.rollout(ours.median_run), 2, axis=2)
-    expert = study.simulated["diverse"].frames(ours.demonstrations[0])
+    return imitation_strip(study.methods[OURS], study.simulated["diverse"])
+
+
+def imitation_strip(method: EvaluatedMethod, demonstrations: SimulatedSet) -> Strip:
+    """A clip of the expert, its translation and the agent, in the run of median final distance."""
+    agent, translated = np.split(method.rollout(method.median_run), 2, axis=2)
+    expert = demonstrations.frames(method.demonstrations[0])
     return make_strip([("expert", expert), ("translated", translated), ("agent", agent)])
 
 

@@ -26,7 +26,7 @@ class Demonstration:
     """``clips``, uint8 (2, 1 + moments, size, size, 3), and the ``times`` of both, in seconds.
 
     ``marks`` (2, 1 + moments, 5, 2) are where the things named in ``MARKS`` are, x and y in pixels, also if
-    hidden or outside of the picture.
+    hidden. Instead of joints outside of the picture there is the place where the arm leaves it.
     """
 
     clips: np.ndarray
@@ -68,8 +68,19 @@ def render_demonstration(rng: np.random.Generator, moments: int, size: int) -> D
             [(*object_xy, 0.02), (*push.target_xy, 0.0), (*cup[:2], cup[2] + 0.02), wrist, elbow]
         )
         for places, view in zip(marks, views, strict=True):
-            places[index] = 0.5 * size * (view.lens.seen(view.camera.project(points)) + 1.0) - 0.5
+            shown = view.lens.seen(view.camera.project(points))
+            for joint in range(MARKS.index("wrist"), len(MARKS)):
+                shown[joint] = _leaving(shown[joint - 1], shown[joint])
+            places[index] = 0.5 * size * (shown + 1.0) - 0.5
     return Demonstration(clips, times, marks, push, views)
+
+
+def _leaving(inside: np.ndarray, outside: np.ndarray) -> np.ndarray:
+    """Where the way from ``inside`` to ``outside`` leaves the picture; either may be the other. Both (2,)."""
+    way = outside - inside
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = np.where(way == 0, np.inf, (np.sign(way) - inside) / way)
+    return inside + way * min(1.0, max(float(reach.min()), 0.0))
 
 
 def _sample_views(rng: np.random.Generator) -> tuple[Push, tuple[View, View]]:

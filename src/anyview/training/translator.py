@@ -23,8 +23,8 @@ from anyview.video.pixels import to_input
 
 _OPTIMIZERS: dict[str, MakeOptimizer] = {
     "adam": lambda parameters: torch.optim.Adam(parameters, fused=True),
-    # The averages and the constant of TensorFlow, the thesis's framework; PyTorch's own are 0.9 and 1e-6.
-    "adadelta": lambda parameters: torch.optim.Adadelta(parameters, rho=0.95, eps=1e-8, foreach=True),
+    # TensorFlow 2's beside its rate, 0.001, the one that the thesis states; PyTorch's own are 0.9 and 1e-6.
+    "adadelta": lambda parameters: torch.optim.Adadelta(parameters, rho=0.95, eps=1e-7, foreach=True),
 }
 
 

@@ -3,8 +3,8 @@
 Enc finds keypoints: the mean places under softmaxes over maps (Finn et al. 2016), with what the thing there
 looks like. T tells from the expert's keypoints, now and in the first frame, where those of the target's first
 frame go. Dec draws that: it carries each keypoint's look to its new place as a Gaussian (Jakab et al. 2018,
-Kulkarni et al. 2019), and blends what it has drawn into the target's first frame by a mask (Ebert et al.
-2017), so that whatever stands still is copied.
+Kulkarni et al. 2019), with lines from each to the next along which limbs and tools are drawn, and blends all
+this into the target's first frame by a mask (Ebert et al. 2017), so that whatever stands still is copied.
 
 Same methods as those of ``network.ContextTranslator``, with one encoder for the expert and for the context.
 """
@@ -66,7 +66,7 @@ class KeypointEncoder(nn.Module):
         x = x + self.everywhere(pooled)[:, :, None, None]
         for skip, lateral, up, smooth in zip((middle, fine), self.lateral, self.up, self.smooth, strict=True):
             x = smooth(activate(F.interpolate(up(x), scale_factor=2.0) + lateral(skip)))
-        heat = self.heat(x).flatten(2).softmax(-1)
+        heat = self.heat(x).flatten(2).float().softmax(-1)  # places need more digits than bfloat16 has
         where = heat.unflatten(2, x.shape[2:])
         axis = _axis(x)
         places = torch.stack(((where.sum(2) * axis).sum(-1), (where.sum(3) * axis).sum(-1)), -1)
@@ -115,7 +115,7 @@ class DrawingTerms(NamedTuple):
     still: Tensor
     """The context's part of the finest map, (C, 32, H/2, W/2)."""
     tints: Tensor
-    """What a keypoint adds to that map where it is drawn, (C, 32, K)."""
+    """What a keypoint or a line adds to that map where it is drawn, (C, 32, 2 K - 1)."""
 
 
 class KeypointDecoder(nn.Module):
@@ -125,8 +125,8 @@ class KeypointDecoder(nn.Module):
         super().__init__()
         fine, middle, coarse = _CHANNELS
         self.still = nn.Conv2d(fine, middle, 1)
-        self.drawn = nn.Parameter(torch.empty(KEYPOINTS, _LOOK + 1, middle))
-        self.erased = nn.Parameter(torch.empty(KEYPOINTS, _LOOK + 1, middle))
+        self.drawn = nn.Parameter(torch.empty(2 * KEYPOINTS - 1, _LOOK + 1, middle))
+        self.erased = nn.Parameter(torch.empty(2 * KEYPOINTS - 1, _LOOK + 1, middle))
         for weights in (self.drawn, self.erased):
             nn.init.normal_(weights, std=(_LOOK + 1) ** -0.5)
         self.down = nn.ModuleList([_layer(middle, middle, 3, 2), _layer(middle, coarse, 3, 2)])
@@ -140,10 +140,11 @@ class KeypointDecoder(nn.Module):
     def skip_terms(self, skips: list[Tensor]) -> DrawingTerms:
         """What ``forward`` needs of what ``KeypointTranslator.encode_context`` returns beside z2."""
         first, code, finest, looks = skips
-        known = torch.cat((looks, torch.ones_like(looks[..., :1])), -1)
+        known = torch.cat((looks, 0.5 * (looks[:, 1:] + looks[:, :-1])), 1)  # of keypoints, then of lines
+        known = torch.cat((known, torch.ones_like(known[..., :1])), -1)
         drawn, erased = (torch.einsum("nka,kac->nck", known, w) for w in (self.drawn, self.erased))
         still = self.still(finest)
-        return DrawingTerms(first, still + _paint(erased, _gaussians(_places(code), still)), drawn)
+        return DrawingTerms(first, still + _paint(erased, _strokes(_places(code), still)), drawn)
 
     def forward(self, z: Tensor, terms: DrawingTerms, noise: Generator | None = None) -> Tensor:
         """``z`` (N, ...) in the ``terms`` of C contexts, row n modulo C; ``noise`` is not needed."""
@@ -151,7 +152,7 @@ class KeypointDecoder(nn.Module):
             each if len(each) == len(z) else each.repeat(len(z) // len(each), *[1] * (each.ndim - 1))
             for each in terms
         )
-        finest = activate(still + _paint(tints, _gaussians(_places(z), still)))
+        finest = activate(still + _paint(tints, _strokes(_places(z), still)))
         middle = self.down[0](finest)
         x = self.down[1](middle)
         x = self.deep(x + self.vector(z[:, 2 * KEYPOINTS :])[:, :, None, None])
@@ -246,13 +247,29 @@ def _axis(like: Tensor) -> Tensor:
     return (2 * torch.arange(side, device=like.device, dtype=torch.float32) + 1) / side - 1
 
 
-def _gaussians(places: Tensor, like: Tensor) -> Tensor:
-    """(N, K, H, W): a Gaussian of height 1 around each of ``places`` (N, K, 2), on maps ``like``."""
-    axis, sharpness = _axis(like), 0.5 * (0.5 * like.shape[-1] / _SIGMA) ** 2
-    across, down = (torch.exp(-sharpness * (axis - part).square()) for part in places.split(1, -1))
-    return down[..., :, None] * across[..., None, :]
+def _strokes(places: Tensor, like: Tensor) -> Tensor:
+    """(N, 2 K - 1, H, W), on maps ``like``: Gaussians of height 1 around ``places`` (N, K, 2) and lines.
+
+    There is a line from each keypoint to the next.
+    """
+    axis = _axis(like)
+    grid = torch.stack(torch.meshgrid(axis, axis, indexing="xy")).flatten(1)  # (2, H W)
+    with torch.autocast(like.device.type, enabled=False):  # differences of squares need all digits
+        squares = _squares(places.float(), grid)
+    return torch.exp(-0.5 * (0.5 * len(axis) / _SIGMA) ** 2 * squares).unflatten(2, like.shape[2:])
 
 
-def _paint(tints: Tensor, gaussians: Tensor) -> Tensor:
-    """(N, C, H, W): each keypoint's tint, of ``tints`` (N, C, K), where its one of ``gaussians`` is high."""
-    return (tints @ gaussians.flatten(2)).unflatten(2, gaussians.shape[2:])
+def _squares(places: Tensor, grid: Tensor) -> Tensor:
+    """Squared distances (N, 2 K - 1, P) of ``grid`` (2, P) from ``places`` (N, K, 2), then from the lines."""
+    # |p - a|^2 of every pixel p and place a, and of lines from a along w what is nearest, t w beyond a.
+    squares = grid.square().sum(0) - 2 * places @ grid + places.square().sum(-1, keepdim=True)
+    start, ways = places[:, :-1], places[:, 1:] - places[:, :-1]
+    along = ways @ grid - (ways * start).sum(-1, keepdim=True)  # (p - a) w
+    length = ways.square().sum(-1, keepdim=True)
+    t = (along / length.clamp(min=1e-6)).clamp(0, 1)
+    return torch.cat((squares, squares[:, :-1] - t * (2 * along - t * length)), 1)
+
+
+def _paint(tints: Tensor, strokes: Tensor) -> Tensor:
+    """(N, C, H, W): the tint of each stroke, of ``tints`` (N, C, S), where that of ``strokes`` is high."""
+    return (tints @ strokes.flatten(2)).unflatten(2, strokes.shape[2:])

@@ -1,0 +1,1 @@
+"""Trained weights for others: policies as ONNX files, methods as model folders on a hub."""
