@@ -7,8 +7,7 @@ from anyview import paths
 from anyview.config import load_params
 from anyview.runtime.errors import choose, run_stage
 from anyview.training.common.fit import fit
-from anyview.training.translator import TranslatorObjective
-from anyview.video.datasets import open_dataset
+from anyview.training.translator import TranslatorObjective, open_learnt
 
 
 def main(arguments: list[str]) -> None:
@@ -16,10 +15,7 @@ def main(arguments: list[str]) -> None:
     params = load_params()
     name = choose(arguments, params.translator_cells, "python stages/train.py CELL")
     cell = params.translator_cells[name]
-    pretraining = open_dataset(cell.pretraining.dataset) if cell.pretraining.iterations else None
-    objective = TranslatorObjective(
-        cell, params.training, params.base.seed, open_dataset(cell.dataset), pretraining
-    )
+    objective = TranslatorObjective(cell, params.training, params.base.seed, *open_learnt(cell))
     fit(name, objective, paths.model(name))
 
 

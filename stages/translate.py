@@ -18,7 +18,8 @@ def main(arguments: list[str]) -> None:
     params = load_params()
     name = choose(arguments, params.translator_cells, "python stages/translate.py CELL")
     model = load_translator(paths.model(name))
-    dataset = open_dataset(params.translator_cells[name].dataset)
+    cell = params.translator_cells[name]
+    dataset = open_dataset(cell.dataset, cell.other_experts)
     with whole_folder(paths.translations(name)) as folder:
         rng = stream(params.base.seed, f"translate/{name}")
         evaluate(model, dataset, folder, params.assessment, rng)

@@ -16,6 +16,7 @@ pytestmark = pytest.mark.slow
 def beyond(trunk, tmp_path_factory) -> Study:
     """The whole of beyond/ on top of the trunk."""
     study = trunk.copy(tmp_path_factory.mktemp("beyond"))
+    study.run("dvc", "repro", "split@real", "split@rendered")
     study = Study(study.folder / "beyond", study.scratch)
     study.run("dvc", "repro")
     return study
@@ -37,6 +38,15 @@ def test_metrics_and_page_tell_of_every_cell(beyond):
         assert f'"{cell}"' in json.dumps(metrics), cell
     assert page.count("<img") >= 2
     assert (beyond.folder / "data/beyond/figures/clip-decides.webp").read_bytes()[8:12] == b"WEBP"
+
+
+def test_a_robot_imitates_held_out_clips_of_a_hand(beyond):
+    shown = pd.read_csv(beyond.folder / "data/policies/human/demonstrations.csv")["clip"]
+    split = pd.read_csv(beyond.folder / "data/splits/real.csv").set_index("clip")["split"]
+    assert set(split[shown]) == {"validation"}
+    translated = pd.read_csv(beyond.folder / "data/translations/sim-human/clips.csv")
+    assert set(split[translated["source"]]) == {"validation"}
+    assert translated["clip"].str.startswith("diverse").all()
 
 
 def test_each_context_is_run_for_both_goals_and_no_evaluation_sees_tuning_contexts(beyond):

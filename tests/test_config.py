@@ -90,6 +90,31 @@ def test_the_committed_params_are_sound():
             "beyond.translators.sim-choice.dataset: 'real' is none of these: diverse, narrow, choice",
         ),
         (
+            "beyond.translators.sim-human.experts",
+            "choice",
+            "beyond.translators.sim-human.experts: 'choice' is none of these: real, rendered",
+        ),
+        (
+            "beyond.translators.sim-human.pretraining.dataset",
+            "diverse",
+            "beyond.translators.sim-human.pretraining.dataset: 'diverse' is none of these: real, rendered",
+        ),
+        (
+            "beyond.translators.sim-human.augment",
+            True,
+            "beyond.translators.sim-human: other experts' clips are not augmented, and paired with `any` of ",
+        ),
+        (
+            "beyond.cells.human.experts",
+            "choice",
+            "beyond.cells.human.experts: 'choice' is none of these: diverse, real",
+        ),
+        (
+            "beyond.cells.human.own_clips",
+            True,
+            "beyond.cells.human: other experts' clips are the same for every context, and no clock's",
+        ),
+        (
             "beyond.sets.wide",
             {"task": "push", "contexts": "choice", "demos": 4},
             "beyond.split.wide: missing key",
@@ -195,7 +220,7 @@ def test_the_committed_params_are_sound():
         (
             "evidence.translators",
             ["sim", "real-pretrained"],
-            "evidence.translators: real-pretrained pretrains, and those of the evidence do not",
+            "evidence.translators: real-pretrained pretrains (translators.real-pretrained.",
         ),
         ("real.ingest.frames", 10**6, "real.ingest.frames: Input should be less than or equal to 10000"),
     ],

@@ -259,7 +259,7 @@ def test_cells_are_those_of_params():
     ("folder", "unread", "from_the_study"),
     [
         (ROOT, {"data/raw/surrogate", "data/clips/rendered", "data/splits/rendered.csv"}, set()),
-        (BEYOND, set(), {"data/policies/ours"}),
+        (BEYOND, set(), {"data/policies/ours", "data/clips/real"}),
     ],
     ids=["study", "beyond"],
 )

@@ -166,7 +166,10 @@ class LossWeights(Block):
 class Pretraining(Block):
     """What a translator learns from before it sees its own clips."""
 
-    dataset: str = Field(description="set of clips to pretrain on; the cell's own set where there is none")
+    dataset: str = Field(
+        description="set of clips to pretrain on, or where the cell has `experts`, their set at first; the "
+        "cell's own set where there is no pretraining"
+    )
     iterations: CountOrNone = Field(description="how many of the cell's iterations that takes; 0 for none")
 
 
@@ -178,6 +181,11 @@ class TranslatorCell(Block):
     optimizer: Literal["adam", "adadelta"]
     iterations: Count
     weights: LossWeights
+    experts: str | None = Field(
+        default=None,
+        description="set of the experts' clips: one of the rig, in which a hand does what the cell's own "
+        "clips show, or the cell's own set, as without this key",
+    )
     pairs: Literal["any", "views"] = Field(
         default="any", description="clips to pair: `any` two, or the `views` of one demonstration"
     )
@@ -191,6 +199,17 @@ class TranslatorCell(Block):
     schedule: Literal["constant", "cosine"] | None = Field(
         default=None, description="the cell's own instead of `training.schedule`"
     )
+
+    @model_validator(mode="after")
+    def _experts_alone(self) -> "TranslatorCell":
+        if self.other_experts and (self.augment or self.pairs != "any"):
+            raise ValueError("other experts' clips are not augmented, and paired with `any` of the cell's")
+        return self
+
+    @property
+    def other_experts(self) -> str | None:
+        """The set of the experts' clips if it is not the cell's own."""
+        return None if self.experts == self.dataset else self.experts
 
 
 class EmbeddingCell(Block):
@@ -366,8 +385,11 @@ class BeyondCell(DemonstrationCell):
     """One method of the studies beyond the thesis, with the runs and learners of `imitation`."""
 
     dataset: str = Field(
-        description="simulated set whose held-out clips are imitated; where they choose between two goals, "
-        "every context is run twice, once for each"
+        description="simulated set whose task is done; where its clips choose between two goals, every "
+        "context is run twice, once for each"
+    )
+    experts: str = Field(
+        description="set whose held-out clips are imitated: that of the rig's clips, or `dataset` itself"
     )
     demonstrations: Count = Field(
         description="clips that are imitated, of each choice; of a `clock`, training clips that it averages"
@@ -378,6 +400,17 @@ class BeyondCell(DemonstrationCell):
     contexts: Literal["evaluation", "tuning"] = Field(
         default="evaluation", description="the random stream that the contexts are drawn from"
     )
+
+    @model_validator(mode="after")
+    def _experts_for_all(self) -> "BeyondCell":
+        if self.other_experts and (self.own_clips or self.reward == "clock"):
+            raise ValueError("other experts' clips are the same for every context, and no clock's")
+        return self
+
+    @property
+    def other_experts(self) -> str | None:
+        """The set of the clips that are imitated if it is not `dataset`."""
+        return None if self.experts == self.dataset else self.experts
 
     @model_validator(mode="after")
     def _clips_to_own(self) -> "BeyondCell":
@@ -514,15 +547,20 @@ def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
         yield (
             f"beyond.translators.{key}.pretraining.dataset",
             beyond.pretraining.dataset,
-            list(params.demonstration_sets),
+            [REAL, RENDERED] if beyond.other_experts else list(params.demonstration_sets),
         )
+        if beyond.other_experts:
+            yield f"beyond.translators.{key}.experts", beyond.other_experts, [REAL, RENDERED]
     for key, method in params.beyond.cells.items():
         yield f"beyond.cells.{key}.dataset", method.dataset, list(params.demonstration_sets)
+        yield f"beyond.cells.{key}.experts", method.experts, [method.dataset, REAL]
         yield f"beyond.cells.{key}.model", method.model, list(params.translator_cells)
     for block, models in (("translators", params.translators), ("embeddings", params.embeddings)):
         yield from ((f"{block}.{key}.dataset", cell.dataset, sets) for key, cell in models.items())
     for key, translator in params.translators.items():
         yield f"translators.{key}.pretraining.dataset", translator.pretraining.dataset, sets
+        if translator.experts:
+            yield f"translators.{key}.experts", translator.experts, [translator.dataset]
     yield "imitation.dataset", params.imitation.dataset, list(params.simulate.sets)
     for key, cell in params.imitation.cells.items():
         fitting = params.embeddings if cell.reward == "embedding" else params.translators
@@ -544,7 +582,8 @@ def _refuse_pretraining_alone(params: Params, name: str) -> None:
     for key in params.evidence.translators:
         if params.translators[key].pretraining.iterations:
             raise AnyviewError(
-                f"{name}: evidence.translators: {key} pretrains, and those of the evidence do not"
+                f"{name}: evidence.translators: {key} pretrains (translators.{key}.pretraining.iterations), "
+                "and those of the evidence do not"
             )
 
 

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from anyview.assessment.yardsticks import copy_loss, find_object, mean_loss, yardsticks
+from anyview.assessment.yardsticks import copy_loss, mean_loss, yardsticks
 from anyview.pusher.contexts import sample_contexts
 from anyview.pusher.render import renderer
 from anyview.seeds import stream
@@ -12,6 +12,7 @@ from anyview.surrogate.push import sample_push
 from anyview.surrogate.scene import OTHER_TARGET_COLOURS, TARGET_COLOUR, Scene, View
 from anyview.surrogate.things import place_things
 from anyview.surrogate.webcam import Lens, Webcam
+from anyview.video.places import find_object
 from tests.training.discworld import disc_clips
 
 SIDE = 48

@@ -9,6 +9,7 @@ import sys
 import time
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pandas as pd
 import pytest
@@ -177,6 +178,24 @@ def test_bad_input_is_named(folder, monkeypatch, clip, options, complaint):
     options = {"model": None, "context": None, "output": Path("mine")} | options
     with pytest.raises(AnyviewError, match=f"^{re.escape(complaint)}"):
         prepare(clip, seed=0, episodes=5, **options)
+
+
+def test_a_hands_clip_is_brought_in_step_and_to_size(folder, tmp_path, monkeypatch, translator):
+    """By a translator of other experts, which comes before those that are not for the agent's view."""
+    (tmp_path / "params.yaml").write_bytes((folder / "params.yaml").read_bytes())
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data/clips").symlink_to(folder / "data/clips")
+    models = tmp_path / "data/models"
+    save_translator(models / "real-adam", translator, {"dataset": "real"})
+    save_translator(models / "sim-human", translator, {"dataset": "diverse", "experts": "real"})
+    monkeypatch.chdir(tmp_path)
+    task = prepare("real-0", seed=0, episodes=5, model=None, context=None, output=Path("mine"))
+    assert task.model == Path("data/models/sim-human")
+    assert task.clip.shape == (50, SIZE, SIZE, 3)
+    disc = disc_clips(2, length=60)[0]
+    for step, frame in ((0, 4), (28, 35), (42, 51), (49, 59)):  # of 60 frames in 8 s
+        there = cv2.resize(disc[frame], (SIZE, SIZE), interpolation=cv2.INTER_LINEAR)
+        assert np.abs(task.clip[step].astype(int) - there).mean() < 1
 
 
 def test_without_a_trained_translator_it_says_what_to_train(root, tmp_path, expert_clips):

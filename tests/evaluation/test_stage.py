@@ -4,6 +4,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pandas as pd
 import pytest
@@ -11,7 +12,7 @@ import torch
 from ruamel.yaml import YAML
 
 from anyview.config import Params, load_params
-from anyview.evaluation.demonstrations import imitated_demonstrations, own_demonstrations
+from anyview.evaluation.demonstrations import imitated_demonstrations, own_demonstrations, rig_demonstrations
 from anyview.learners.common.policies import load_policy
 from anyview.pusher.contexts import COLOURS, sample_contexts
 from anyview.pusher.expert import roll_out
@@ -24,6 +25,7 @@ from anyview.translator.weights import load_translator, save_translator
 from anyview.video.files import read_video
 from anyview.video.pixels import to_frames
 from anyview.video.sets import open_frames, write_clips, write_set
+from tests.training.discworld import clip_table, disc_clips
 
 SIZE = 32
 CLIPS = 10
@@ -115,6 +117,26 @@ def test_own_clips_are_held_out_ones_of_the_choice_and_fewer_are_the_first_of_mo
         np.testing.assert_array_equal(fewer.frames, frames[:, :1])
     shared, _ = imitated_demonstrations(params, "red")
     assert len(shared) == 2
+
+
+def test_a_hands_held_out_clips_are_imitated_in_step_and_in_size(study, params):
+    hand = disc_clips(6, size=24, length=80)
+    table = clip_table(["train"] * 3 + ["validation"] * 3)
+    folder = study / "data/clips/real"
+    folder.mkdir()
+    write_set(folder, table[["clip"]], [write_clips(folder / "clips.avi", hand, 10.0)])
+    table.to_csv(study / "data/splits/real.csv", index=False)
+    names, frames = rig_demonstrations(params, "real")
+    assert len(set(names)) == 2
+    assert set(names) < set(table["clip"][3:])
+    assert frames.shape == (2, 50, SIZE, SIZE, 3)
+    clip = hand[list(table["clip"]).index(names[0])]
+    for step, frame in ((0, 5), (14, 26), (28, 47), (42, 68), (49, 79)):  # of 80 frames in 8 s
+        there = cv2.resize(clip[frame], (SIZE, SIZE), interpolation=cv2.INTER_LINEAR)
+        assert np.array_equal(frames[0, step], there)
+    many = params.model_copy(update={"imitation": params.imitation.model_copy(update={"demonstrations": 4})})
+    with pytest.raises(AnyviewError, match=r"demonstrations: 4, but data/splits/real\.csv holds out 3 clips"):
+        rig_demonstrations(many, "real")
 
 
 def test_too_few_clips_for_a_context_are_named(params):

@@ -8,8 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from anyview.video.sets import write_clips, write_set
 from tests.report.test_page import Reader
-from tests.stage_outputs import SIZE, Data
+from tests.stage_outputs import SIZE, Data, clip
 
 
 def two_goals(data: Data, cell: str, distance: float) -> None:
@@ -39,6 +40,12 @@ def beyond(tmp_path_factory, params, report) -> Path:
     for index, (name, cell) in enumerate(params.beyond.cells.items()):
         make = two_goals if cell.dataset == "choice" else Data.policies
         make(data, name, 0.01 + 0.02 * index)
+    hand = data.root / "data/clips/real"
+    hand.mkdir()
+    stored = write_clips(hand / "clips.avi", clip(80, 0, 0)[None, :, ::2, ::2], 10.0)
+    write_set(hand, pd.DataFrame({"clip": ["pair-000-left"]}), [stored])
+    shown = data.root / "data/policies/human/demonstrations.csv"
+    pd.DataFrame({"clip": ["pair-000-left"]}).to_csv(shown, index=False)
     done = report(data.root, "beyond")
     assert done.returncode == 0, done.stderr
     return data.root
@@ -49,6 +56,7 @@ def test_the_page_stands_alone_and_has_its_chapters(beyond):
     assert all(source.startswith("data:") for source in page.sources)
     assert {link[1:] for link in page.links if link.startswith("#")} <= set(page.ids)
     wanted = {"choice", "one-context-under-two-clips", "where-the-object-ends", "how-many-clips", "rollouts"}
+    wanted |= {"from-a-humans-hand-to-a-robot", "a-hand-and-the-robot"}
     assert wanted <= set(page.ids)
     assert all(page.alternatives)
 
@@ -56,7 +64,7 @@ def test_the_page_stands_alone_and_has_its_chapters(beyond):
 def test_tables_tell_of_every_cell(beyond, params):
     text = (beyond / "data/beyond/report.md").read_text(encoding="utf-8")
     tables = [block.splitlines() for block in text.split("\n\n") if block.startswith("|")]
-    assert len(tables) == 6
+    assert len(tables) == 8
     for rows in tables:
         assert {row.count(" | ") for row in rows} == {rows[0].count(" | ")}
     rows = {row.split(" | ")[0]: row for row in tables[-1]}
@@ -64,7 +72,7 @@ def test_tables_tell_of_every_cell(beyond, params):
     assert rows["| `clips-every-4`"].split(" | ")[1:3] == ["20", "1 in 4"]
     assert rows["| `clips-two-thirds`"].split(" | ")[1:3] == ["20", "first 67%"]
     metrics = json.loads((beyond / "metrics/beyond.json").read_text())
-    told = {cell for part in ("choice", "clips", "clock", "tasks") for cell in metrics[part]}
+    told = {cell for part in ("choice", "clips", "imitation", "tasks") for cell in metrics[part]}
     assert told == {*params.beyond.cells, "ours"}
     assert metrics["clips"]["clips-1"].keys() == {
         "runs",

@@ -11,7 +11,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from anyview.assessment.yardsticks import find_object
 from anyview.scenes import looks
 from anyview.scenes.camera import View
 from anyview.scenes.demonstrations import DURATION, MARKS, Demonstration, render_demonstration
@@ -25,6 +24,7 @@ from anyview.surrogate.push import Push, sample_push
 from anyview.surrogate.textures import texture_files
 from anyview.surrogate.things import THING_COLOURS
 from anyview.video.datasets import clip_pairs, open_dataset
+from anyview.video.places import find_object
 from tests.long_stages import change, digests
 from tests.test_structure import SOURCE, reached_from
 

@@ -15,7 +15,7 @@ from anyview.training.common.batches import (
     validation_triplets,
 )
 from anyview.video.datasets import Dataset
-from tests.training.discworld import clip_table, disc_clips
+from tests.training.discworld import SIZE, clip_table, disc_clips, disc_marks
 
 
 def test_training_pairs_are_two_training_clips_at_one_time(discs):
@@ -53,6 +53,54 @@ def test_the_frames_to_embed_are_those_of_the_clips_i(discs):
     assert frames.shape == (2, 3, 16, 16, 3)
     assert np.array_equal(frames[0, 1], discs.frames[3, 4])
     assert np.array_equal(frames[1, 2], discs.frames[1, 11])
+
+
+def test_other_experts_are_paired_in_step_and_in_size():
+    """i: clips of the rig, of moments that their manifest tells; j: the set's own clips, as far as i is."""
+    table = clip_table(["train"] * 6 + ["validation"] * 2)
+    times = "0.00 1.00 2.40 4.70 7.90"
+    rig = Dataset(
+        "rendered",
+        disc_clips(8, size=24, length=5, seed=1),
+        table.assign(times=times),
+        disc_marks(8, size=24, length=5, seed=1),
+    )
+    own = Dataset("diverse", disc_clips(8, length=50), table, experts=rig)
+    pairs = training_pairs(own, np.random.default_rng(0), 400)
+    assert set(pairs.sources) == set(pairs.targets) == set(range(6))
+    assert set(pairs.times) == set(range(5))
+    steps = own.steps(pairs.sources, pairs.times)
+    assert {*zip(pairs.times, steps, strict=True)} == {(0, 0), (1, 4), (2, 14), (3, 28), (4, 48)}
+    expert, target = np.split(pairs.frames(own), 2)
+    assert expert.shape == target.shape == (400, SIZE, SIZE, 3)
+    for n in range(0, 400, 40):
+        assert np.array_equal(target[n], own.frames[pairs.targets[n], steps[n]])
+        there = rig.frames[pairs.sources[n], pairs.times[n]]
+        assert np.abs(expert[n].mean((0, 1)) - there.mean((0, 1))).max() < 6
+    held_out = validation_pairs(own, np.random.default_rng(0), 20)
+    assert set(held_out.sources) == set(held_out.targets) == {6, 7}
+
+
+def test_marks_of_other_experts_are_theirs_and_own_clips_are_looked_at():
+    table = clip_table(["train"] * 6 + ["validation"] * 2)
+    marks = disc_marks(8, size=24, length=80, seed=1)
+    rig = Dataset("rendered", disc_clips(8, size=24, length=80, seed=1), table, marks)
+    own, true = disc_clips(8, length=50), disc_marks(8, length=50)
+    dataset = Dataset("diverse", own, table, experts=rig)
+    pairs = training_pairs(dataset, np.random.default_rng(0), 60)
+    paired, context = pairs.marks(dataset)
+    expert, target = np.split(paired, 2)
+    unit = SIZE / 24
+    expected = unit * (marks[pairs.sources, pairs.times] + 0.5) - 0.5
+    np.testing.assert_allclose(expert, expected, rtol=1e-5)
+    steps = dataset.steps(pairs.sources, pairs.times)
+    assert np.abs(target[:, 0] - true[pairs.targets, steps, 0]).max() < 1
+    assert np.abs(target[:, 1] - true[pairs.targets, -1, 0]).max() < 1  # the object ends at its target
+    assert np.abs(context[:, 0] - true[pairs.targets, 0, 0]).max() < 1
+    unmarked = Dataset("diverse", own, table, experts=Dataset("real", rig.frames, table))
+    paired, _ = pairs.marks(unmarked)
+    assert np.isnan(paired[:60]).all()
+    np.testing.assert_array_equal(paired[60:], target)
 
 
 def test_views_are_of_one_demonstration_to_train_on():

@@ -77,6 +77,15 @@ def test_the_loss_of_places_is_their_mean_squared_distance(marks):
     assert float(place_loss(codes, torch.from_numpy(marks))) == pytest.approx(expected, rel=1e-4, abs=1e-6)
 
 
+def test_a_mark_that_is_not_known_costs_nothing_and_pulls_at_nothing():
+    codes = torch.zeros(2, 2 * KEYPOINTS + 32, requires_grad=True)
+    marks = torch.tensor([[[0.5, 0.0], [torch.nan, torch.nan]], [[torch.nan, torch.nan], [0.0, 0.2]]])
+    loss = place_loss(codes, marks)
+    loss.backward()
+    assert loss.item() == pytest.approx((0.5**2 + 0.2**2) / 4)
+    assert torch.nonzero(codes.grad).tolist() == [[0, 0], [1, 3]]
+
+
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 1000), hnp.arrays(int, (9, 2), elements=st.integers(0, 15)))
 def test_marks_are_mirrored_with_their_pictures(seed, pixels):

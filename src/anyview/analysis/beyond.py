@@ -43,13 +43,13 @@ def analyse_beyond(study: Study) -> BeyondResults:
 
 
 def beyond_metrics(results: BeyondResults) -> Tree:
-    """The tree of ``metrics/beyond.json``; ``clock`` and `ours` are in the thesis's own task."""
+    """The tree of ``metrics/beyond.json``; ``imitation`` is in the thesis's own task."""
     tables = {
         "data": results.others.data,
         "translation": results.others.translation,
         "choice": results.choices,
         "clips": results.clips,
-        "clock": results.others.imitation,
+        "imitation": results.others.imitation,
         "tasks": results.tasks,
     }
     return {name: details(table) for name, table in tables.items()}

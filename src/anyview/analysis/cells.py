@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-OURS = "ours"
+OURS, CLOCK, HUMAN = "ours", "clock", "human"
 ADAM, ADADELTA, AUGMENTED, SIM = "real-adam", "real-adadelta", "real-augmented", "sim"
 
 LABELS = {
@@ -20,6 +20,7 @@ LABELS = {
     "choice-oracle": "Oracle (true view)",
     "choice-clock": "clock alone",
     "clock": "Clock alone",
+    "human": "A hand's clips (20)",
     "reach": "Reach (20 clips)",
     "reach-oracle": "Reach, Oracle",
     "strike": "Strike (20 clips)",

@@ -53,7 +53,8 @@ def evaluate_clip(model: Translator, dataset: Dataset, source: int, target: int)
     the last frame alone (figure 18).
     """
     device = next(model.parameters()).device
-    expert, true = (to_input(dataset.frames[clip]).to(device) for clip in (source, target))
+    clips = dataset.expert_clip(source), dataset.frames[target]
+    expert, true = (to_input(clip).to(device) for clip in clips)
     z2, skips = model.encode_context(true[:1])
     z_true = model.encode_expert(true)
     z1 = model.encode_expert(expert)
@@ -66,10 +67,10 @@ def evaluate_clip(model: Translator, dataset: Dataset, source: int, target: int)
         float(alignment_loss(z3, z_true)),
     ]
     shown, wanted = to_frames(translated), np.array(dataset.frames[target])
-    names = dataset.clips["clip"]
+    names, sources = dataset.clips["clip"], (dataset.experts or dataset).clips["clip"]
     row: dict[str, str | float] = {
         "clip": names.iloc[target],
-        "source": names.iloc[source],
+        "source": sources.iloc[source],
         "pair": dataset.clips["pair"].iloc[target],
         "split": dataset.clips["split"].iloc[target],
         "loss": sum(losses),

@@ -41,7 +41,9 @@ def feature_weights(
 def _rises(model: Translator, dataset: Dataset, pair: tuple[int, int], offsets: np.ndarray) -> np.ndarray:
     """Mean rise of L_tr (T,) when each frame is replaced by the ones ``offsets`` later, around the end."""
     device = next(model.parameters()).device
-    expert, true = (to_input(dataset.frames[clip]).to(device) for clip in pair)
+    source, target = pair
+    clips = dataset.expert_clip(source), dataset.frames[target]
+    expert, true = (to_input(clip).to(device) for clip in clips)
     z1 = model.encode_expert(expert)
     task = model.embed_task(z1)  # of the clip as it is: a frame is replaced where T reads its time step
     z2, skips = model.encode_context(true[:1])

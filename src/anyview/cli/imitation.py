@@ -25,6 +25,9 @@ from anyview.runtime.scratch import checkpoint_folder
 from anyview.sharing.checksums import find_model
 from anyview.translator.weights import read_meta
 from anyview.video.files import write_video
+from anyview.video.phases import frames_in_step, seconds_of
+from anyview.video.pictures import resize
+from anyview.video.sets import read_stored
 
 VIDEO = "rollout.mp4"
 _NAME = "imitate"  # of the method, and of the stream of fresh contexts
@@ -83,7 +86,10 @@ def prepare(
     if (dataset := meta.get("dataset")) not in study.demonstration_sets:
         sets = ", ".join(study.demonstration_sets)
         raise AnyviewError(f"{folder}: not for the simulated agent's view; train it on one of {sets}")
-    frames, _ = read_clip(clip, meta["image_size"])
+    if stored and "experts" in meta:
+        frames = resize(read_stored(paths.clip_set(stored.dataset), clip)[0], meta["image_size"])
+    else:
+        frames, _ = read_clip(clip, meta["image_size"])
     if len(frames) < FRAMES:
         raise AnyviewError(f"{clip}: {len(frames)} frames, fewer than the {FRAMES} of an episode")
     params = _one_run(study, folder, str(dataset), meta["image_size"], seed, episodes)
@@ -96,8 +102,11 @@ def prepare(
         raise AnyviewError(f"--context {context}: there are contexts 0 to {study.imitation.runs - 1}")
     chosen = stored.choice if stored and scene.choice else None
     shown = next((colour for colour in COLOURS if colour == chosen), None)
-    by_progress = np.linspace(0, len(frames) - 1, FRAMES).round().astype(int)
-    return Task(params, folder, frames[by_progress], scene.choosing(shown) if shown else scene, shown)
+    if "experts" in meta:
+        in_step = frames_in_step(seconds_of(len(frames)))
+    else:
+        in_step = np.linspace(0, len(frames) - 1, FRAMES).round().astype(int)
+    return Task(params, folder, frames[in_step], scene.choosing(shown) if shown else scene, shown)
 
 
 def train(task: Task, output: Path) -> Outcome:
@@ -132,11 +141,14 @@ def train(task: Task, output: Path) -> Outcome:
 
 
 def _fitting_model(params: Params, dataset: str) -> Path:
-    """The translator of clips of ``dataset`` with every loss, the one with a task embedding first."""
+    """The translator of clips of ``dataset`` with every loss, the one with a task embedding first.
+
+    Before these comes one for which ``dataset`` is that of other experts.
+    """
     cells = {
         name: cell
         for name, cell in params.translator_cells.items()
-        if cell.dataset == dataset and _has_every_loss(cell.weights)
+        if (cell.dataset == dataset and _has_every_loss(cell.weights)) or cell.other_experts == dataset
     }
     trained = [name for name in cells if (paths.model(name) / "model.json").is_file()]
     if not trained:
@@ -145,7 +157,9 @@ def _fitting_model(params: Params, dataset: str) -> Path:
             f"{paths.DATA / 'models'}: no translator of {dataset} clips is trained yet ({listed}); "
             "run `dvc repro`, or name one by --model"
         )
-    return paths.model(max(trained, key=lambda name: cells[name].task_embedding))
+    return paths.model(
+        max(trained, key=lambda name: (bool(cells[name].other_experts), cells[name].task_embedding))
+    )
 
 
 def _has_every_loss(weights: LossWeights) -> bool:

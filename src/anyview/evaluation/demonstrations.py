@@ -9,6 +9,7 @@ from anyview.config import Params
 from anyview.pusher.contexts import COLOURS, Colour, Context
 from anyview.runtime.errors import AnyviewError
 from anyview.seeds import stream
+from anyview.video.datasets import open_dataset
 from anyview.video.sets import FrameStore, open_frames
 from anyview.video.splits import read_split
 
@@ -27,6 +28,21 @@ def imitated_demonstrations(params: Params, choice: Colour | None = None) -> Cli
     """
     store, rows = _split_rows(params, "validation", choice)
     return _draw(params, store, rows, params.imitation.demonstrations, "imitated", f"holds out {len(rows)}")
+
+
+def rig_demonstrations(params: Params, experts: str) -> Clips:
+    """As ``imitated_demonstrations``, of the rig's set ``experts``, in step with simulated clips.
+
+    Raises AnyviewError where its split holds out fewer.
+    """
+    dataset, wanted = open_dataset(experts), params.imitation.demonstrations
+    rows = dataset.split("validation")
+    if len(rows) < wanted:
+        held_out = f"{paths.split_table(experts)} holds out {len(rows)} clips"
+        raise AnyviewError(f"params.yaml: imitation.demonstrations: {wanted}, but {held_out}")
+    chosen = np.sort(stream(params.base.seed, "imitated").choice(rows, wanted, replace=False))
+    frames = [dataset.in_step(row, params.sim.image_size) for row in chosen]
+    return Clips(list(dataset.clips["clip"].iloc[chosen]), np.stack(frames))
 
 
 def own_demonstrations(params: Params, contexts: int, choice: Colour | None = None) -> Clips:

@@ -15,6 +15,7 @@ from anyview.evaluation.demonstrations import (
     clock_clips,
     imitated_demonstrations,
     own_demonstrations,
+    rig_demonstrations,
     two_goals,
 )
 from anyview.evaluation.methods import Method
@@ -25,6 +26,7 @@ from anyview.runtime.outputs import whole_folder, write_atomically
 from anyview.runtime.scratch import checkpoint_folder
 from anyview.runtime.workers import run_tasks
 from anyview.seeds import stream
+from anyview.video.datasets import dataset_files
 from anyview.video.files import write_video
 
 RATE = 10.0  # frames a second
@@ -107,6 +109,8 @@ def _imitated(name: str, params: Params) -> list[tuple[Colour | None, list[Conte
     def clips(choice: Colour | None = None) -> Clips:
         if beyond and beyond.own_clips:
             return own_demonstrations(params, len(contexts), choice)
+        if beyond and beyond.other_experts:
+            return rig_demonstrations(params, beyond.other_experts)
         clock = cell.reward == "clock"
         return clock_clips(params) if clock else imitated_demonstrations(params, choice)
 
@@ -120,6 +124,9 @@ def _origin(name: str, params: Params, sources: Sequence[Path]) -> tuple[list[An
     values = params.model_dump(include={"base", "sim", "imitation", "adversarial"})
     for block in ("imitation", "adversarial"):
         values[block]["cells"] = values[block]["cells"].get(name)
-    dataset = params.imitation.dataset
-    files = [paths.clip_set(dataset) / "files.csv", paths.split_table(dataset)]
+    cell = params.methods[name]
+    datasets = [params.imitation.dataset]
+    if isinstance(cell, BeyondCell) and cell.other_experts:
+        datasets.append(cell.other_experts)
+    files = [file for dataset in datasets for file in dataset_files(dataset)]
     return [name, values], files + [file for source in sources for file in sorted(source.iterdir())]

@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from anyview import paths
 from anyview.analysis.beyond import BeyondResults
-from anyview.analysis.cells import label
+from anyview.analysis.cells import HUMAN, label
 from anyview.analysis.choice import CHOICE, choosing
 from anyview.analysis.clips import curves
 from anyview.analysis.study import EvaluatedMethod, SimulatedSet, Study
@@ -20,6 +21,9 @@ from anyview.report.illustrations import Illustrations, typical_strip
 from anyview.report.pictures import Clip, Strip, animated_webp, label_view, make_clip, make_strip
 from anyview.report.tasks import task_rollouts, task_strips
 from anyview.report.text import by_cell, environment
+from anyview.video.phases import frames_in_step, seconds_of
+from anyview.video.pictures import resize
+from anyview.video.sets import read_stored
 
 _CONTEXTS = 4
 _SCALE = 3  # of a view in the picture that moves
@@ -36,6 +40,8 @@ def illustrate_beyond(study: Study, results: BeyondResults) -> Illustrations:
         both = shown_twice(study.methods[CHOICE], study.simulated[CHOICE])
         strips["two-clips"] = two_clips(both)
         moving["clip-decides"] = clip_decides(both)
+    if (strip := hand_to_robot(study)) is not None:
+        strips["hand-to-robot"] = strip
     strips |= dict(task_strips(study))
     players = {"rollouts": dict(_rollouts(study)), "task-rollouts": dict(task_rollouts(study))}
     shown = {name: titled for name, titled in players.items() if titled}
@@ -92,10 +98,23 @@ def clip_decides(both: list[Shown]) -> bytes:
     )
 
 
+def hand_to_robot(study: Study) -> Strip | None:
+    """A hand's clip, its translation and the agent, in the run of `human` of median final distance."""
+    method, folder = study.methods.get(HUMAN), paths.clip_set(paths.REAL)
+    if method is None or not folder.exists():
+        return None
+    agent, translated = np.split(method.rollout(method.median_run), 2, axis=2)
+    hand, _ = read_stored(folder, method.demonstrations[0])
+    in_step = resize(hand[frames_in_step(seconds_of(len(hand)))], agent.shape[1])
+    return make_strip([("a hand", in_step), ("translated", translated), ("agent", agent)])
+
+
 def write_beyond(
     study: Study, results: BeyondResults, illustrations: Illustrations, picture: Callable[[str], str]
 ) -> str:
     """The page as Markdown; ``picture(name)`` stands where the illustration ``name`` belongs."""
+    translated = by_cell(results.others.translation)
+    of_hands = {cell for cell in translated if study.params.translators[cell].other_experts}
     written = (
         environment(autoescape=False)
         .get_template("beyond.md.jinja")
@@ -104,15 +123,16 @@ def write_beyond(
             illustrations=illustrations,
             picture=picture,
             data=by_cell(results.others.data),
-            translation=by_cell(results.others.translation),
+            translation={cell: row for cell, row in translated.items() if cell not in of_hands},
+            of_hands={cell: row for cell, row in translated.items() if cell in of_hands},
             choices=by_cell(results.choices),
             against_choice=list(results.against_choice.itertuples()),
             clips=by_cell(results.clips),
             frames_of=partial(_frames_of, study),
             imitation=by_cell(results.others.imitation),
+            differences={row.cell: row for row in results.others.differences.itertuples()},
             tasks={task: list(methods) for task, methods in by_task(study).items()},
             outcomes=by_cell(results.tasks),
-            differences=list(results.others.differences.itertuples()),
         )
     )
     return re.sub(r"\n{3,}", "\n\n", written).strip() + "\n"

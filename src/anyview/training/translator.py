@@ -1,5 +1,6 @@
 """What a context translator is trained for: the losses of pairs of frames that the cell weighs."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from anyview.training.common.optimization import MakeOptimizer
 from anyview.translator.architectures import Translator, make_translator
 from anyview.translator.losses import NAMES, Losses, Marks, batch_losses
 from anyview.translator.weights import save_translator
-from anyview.video.datasets import Dataset
+from anyview.video.datasets import Dataset, open_dataset
 from anyview.video.pixels import to_input
 
 _OPTIMIZERS: dict[str, MakeOptimizer] = {
@@ -25,6 +26,15 @@ _OPTIMIZERS: dict[str, MakeOptimizer] = {
     # TensorFlow 2's beside its rate, 0.001, the one that the thesis states; PyTorch's own are 0.9 and 1e-6.
     "adadelta": lambda parameters: torch.optim.Adadelta(parameters, rho=0.95, eps=1e-7, foreach=True),
 }
+
+
+def open_learnt(cell: TranslatorCell) -> tuple[Dataset, Dataset | None]:
+    """The cell's data set, with that of its experts, and what it pretrains on."""
+    dataset = open_dataset(cell.dataset, cell.other_experts)
+    if not cell.pretraining.iterations:
+        return dataset, None
+    first = open_dataset(cell.pretraining.dataset)
+    return dataset, replace(dataset, experts=first) if cell.other_experts else first
 
 
 class TranslatorObjective:
@@ -58,7 +68,8 @@ class TranslatorObjective:
     @property
     def dataset_names(self) -> list[str]:
         """Of the sets of clips that the training reads."""
-        return [dataset.name for dataset in self._learnt()]
+        learnt = self._learnt()
+        return [dataset.name for dataset in (*learnt, *(each.experts for each in learnt)) if dataset]
 
     def network(self) -> Translator:
         """With the same first weights for every cell of an architecture: ablations differ in losses alone."""
@@ -115,8 +126,9 @@ class TranslatorObjective:
         return {"loss": total} | dict(zip(NAMES, means.tolist(), strict=True))
 
     def save(self, folder: Path, model: Translator, meta: dict[str, Any]) -> None:
-        """Write a model folder."""
-        save_translator(folder, model, meta)
+        """Write a model folder; its description names the set of the ``experts`` if it is another."""
+        experts = self.cell.other_experts
+        save_translator(folder, model, meta | ({"experts": experts} if experts else {}))
 
     def _learnt(self) -> list[Dataset]:
         return [self._pretraining, self.dataset] if self.cell.pretraining.iterations else [self.dataset]
@@ -134,7 +146,7 @@ class TranslatorObjective:
         def load(frames: np.ndarray) -> Tensor:
             return to_input(torch.from_numpy(frames).to(device))
 
-        steps = model.task_frames(dataset.length)
+        steps = model.task_frames((dataset.experts or dataset).length)
         clip = load(pairs.clips(dataset, steps)) if len(steps) else None
         return load(pairs.frames(dataset)), load(pairs.contexts(dataset)), clip
 

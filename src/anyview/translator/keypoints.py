@@ -216,10 +216,11 @@ class KeypointTranslator(nn.Module):
 def place_loss(codes: Tensor, marks: Tensor) -> Tensor:
     """Mean squared distance of the first M keypoints of ``codes`` (N, 2 K + V) from ``marks`` (N, M, 2).
 
-    Marks are in the keypoints' units. Those far outside of the picture count as just outside.
+    Marks are in the keypoints' units. Those far outside of the picture count as just outside, and those that
+    are NaN are not known: no keypoint pays for them.
     """
     gaps = _places(codes)[:, : marks.shape[1]].float() - marks.clamp(-_OUTSIDE, _OUTSIDE)
-    return gaps.square().sum(-1).mean()
+    return torch.where(marks.isnan(), 0.0, gaps).square().sum(-1).mean()
 
 
 def _layer(inputs: int, outputs: int, kernel: int, stride: int = 1) -> nn.Sequential:

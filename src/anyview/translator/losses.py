@@ -25,7 +25,7 @@ NAMES = ("translation", "reconstruction", "alignment")
 
 
 class Marks(NamedTuple):
-    """Where M known things are in the frames of a batch, x and y from -1 to 1 within a picture."""
+    """Where M things are in the frames of a batch, x and y from -1 to 1 in a picture; NaN if not known."""
 
     paired: Tensor
     """(2N, M, 2)."""

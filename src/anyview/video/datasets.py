@@ -1,6 +1,6 @@
 """Data sets: clips with the split of each, and which of the held-out clips are paired."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -10,6 +10,8 @@ import pandas as pd
 from anyview import paths
 from anyview.runtime.errors import AnyviewError
 from anyview.video.marks import marks_file, read_marks
+from anyview.video.phases import frames_in_step, seconds_of, steps_at
+from anyview.video.pictures import resize
 from anyview.video.sets import open_frames
 from anyview.video.splits import read_split
 
@@ -19,12 +21,16 @@ class Dataset:
     """Clips and their splits: ``frames`` uint8 (N, T, H, W, 3), ``clips`` one row for each with its split.
 
     ``marks``, float32 (N, T, M, 2), are the places of M known things in pixels, if the set has any.
+
+    The experts' clips that are paired with the set's own are of the same set, or of the set ``experts``: of
+    another body, before another camera and in its own time.
     """
 
     name: str
     frames: np.ndarray
     clips: pd.DataFrame
     marks: np.ndarray | None = None
+    experts: "Dataset | None" = None
 
     @property
     def length(self) -> int:
@@ -59,9 +65,39 @@ class Dataset:
         groups = clips.groupby("pair", sort=False).indices.values()
         return [self.split("train")[group] for group in groups if len(group) > 1]
 
+    def expert_frames(self, clips: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Frames ``times`` of the experts' ``clips``, uint8 (..., H, W, 3), of the size of the set's own."""
+        if self.experts is None:
+            return self.frames[clips, times]
+        return resize(self.experts.frames[clips, times], self.image_size)
 
-def open_dataset(name: str) -> Dataset:
+    def steps(self, clips: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Where the set's own clips are as far as the experts' ``clips`` at ``times``: frames' indices."""
+        return times if self.experts is None else steps_at(self.experts.seconds[clips, times])
+
+    def expert_clip(self, clip: int) -> np.ndarray:
+        """The experts' ``clip``, uint8 (T, H, W, 3), in step with the set's own clips and of their size."""
+        return self.frames[clip] if self.experts is None else self.experts.in_step(clip, self.image_size)
+
+    def in_step(self, clip: int, size: int) -> np.ndarray:
+        """A ``clip`` of the rig in step with simulated ones, uint8 RGB (50, size, size, 3)."""
+        return resize(self.frames[clip, frames_in_step(self.seconds[clip])], size)
+
+    @cached_property
+    def seconds(self) -> np.ndarray:
+        """When each frame of the rig's clips was taken, (N, T) from the clips' start.
+
+        Of rendered scenes the manifest tells it; ingested clips are taken to last as long as the rig's.
+        """
+        if "times" in self.clips:
+            return np.array([text.split() for text in self.clips["times"]], float)
+        return np.broadcast_to(seconds_of(self.length), self.frames.shape[:2])
+
+
+def open_dataset(name: str, experts: str | None = None) -> Dataset:
     """One of the pipeline's data sets; clips that no split names are left with an empty split.
+
+    ``experts`` names another set for the experts' clips.
 
     Raises AnyviewError if the split table does not fit the clips, leaves fewer than two clips to train on, or
     none to validate with.
@@ -80,7 +116,7 @@ def open_dataset(name: str) -> Dataset:
         if min(map(len, groups), default=0) < least:
             of_each = " of each choice" if "choice" in clips else ""
             raise AnyviewError(f"{table}: split {wanted} needs at least {least} clips{of_each}")
-    return dataset
+    return replace(dataset, experts=open_dataset(experts)) if experts else dataset
 
 
 def dataset_files(name: str) -> list[Path]:
@@ -93,9 +129,13 @@ def clip_pairs(dataset: Dataset, split: str) -> list[tuple[int, int]]:
     """(source, target) clips to evaluate a translator on: every clip of ``split`` once as the target.
 
     The source is the other view of the target's pair, or the next clip of the same choice if it has none. An
-    ``extreme`` target's source is a standard validation clip.
+    ``extreme`` target's source is a standard validation clip. Other experts' clips are the sources in the
+    order of their own ``split``.
     """
     targets = dataset.split(split)
+    if dataset.experts:
+        shown = dataset.experts.split(split)
+        return [(int(shown[n % len(shown)]), int(target)) for n, target in enumerate(targets)]
     if split == "extreme":
         sources = dataset.split("validation")
         if "kind" in dataset.clips:

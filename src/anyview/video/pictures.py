@@ -36,3 +36,12 @@ def _cell(clip: np.ndarray, label: str, moments: int) -> np.ndarray:
     cell[:height, :width] = strip
     place = (2, height + _LABEL - 4)
     return cv2.putText(cell, label, place, cv2.FONT_HERSHEY_SIMPLEX, 0.32, (30, 30, 30), 1, cv2.LINE_AA)
+
+
+def resize(frames: np.ndarray, size: int) -> np.ndarray:
+    """Square uint8 ``frames`` (..., H, H, 3) with sides of ``size`` pixels; unchanged if they have these."""
+    if frames.shape[-2] == size:
+        return frames
+    flat = frames.reshape(-1, *frames.shape[-3:])
+    resized = np.stack([cv2.resize(frame, (size, size), interpolation=cv2.INTER_LINEAR) for frame in flat])
+    return resized.reshape(*frames.shape[:-3], size, size, 3)

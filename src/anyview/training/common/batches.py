@@ -7,12 +7,14 @@ import numpy as np
 
 from anyview.runtime.errors import AnyviewError
 from anyview.video.datasets import Dataset, clip_pairs
+from anyview.video.places import find_object
 
 
 @dataclass(frozen=True)
 class FramePairs:
     """Frames ``times`` of clips ``sources`` (i) and ``targets`` (j): N pairs, of one frame each or of K.
 
+    Where i are of another set than j, ``times`` are i's, and the data set tells which of j's are as far.
     ``sources`` and ``targets`` are (N,) and ``times`` is (N,), or all three are (N, 1), (N, 1) and (N, K).
     """
 
@@ -32,20 +34,39 @@ class FramePairs:
 
     def frames(self, dataset: Dataset) -> np.ndarray:
         """o_t^i and after them o_t^j, uint8 (2N, H, W, 3) or (2N, K, H, W, 3)."""
-        clips = np.concatenate((self.sources, self.targets))
-        return dataset.frames[clips, np.concatenate((self.times, self.times))]
+        steps = dataset.steps(self.sources, self.times)
+        shown = dataset.expert_frames(self.sources, self.times)
+        return np.concatenate((shown, dataset.frames[self.targets, steps]))
 
     def clips(self, dataset: Dataset, times: np.ndarray) -> np.ndarray:
         """Frames ``times`` (K,) of the clips i, uint8 (N, K, H, W, 3); of pairs of one frame each."""
-        return dataset.frames[self.sources[:, None], times]
+        return dataset.expert_frames(self.sources[:, None], times)
 
     def marks(self, dataset: Dataset) -> tuple[np.ndarray, np.ndarray] | None:
-        """The marks of ``frames`` (2N, M, 2) and of ``contexts`` (N, M, 2), in pixels, if the set has any."""
+        """The marks of ``frames`` (2N, M, 2) and of ``contexts`` (N, M, 2), in pixels, if the set has any.
+
+        Where experts of another set have them, the own clips' first two are seen: the object, and the target
+        as where it ends. What is not known or not seen is NaN.
+        """
+        if dataset.experts:
+            return self._seen_marks(dataset, dataset.experts)
         if dataset.marks is None:
             return None
         clips = np.concatenate((self.sources, self.targets))
         times = np.concatenate((self.times, self.times))
         return dataset.marks[clips, times], dataset.marks[self.targets, 0]
+
+    def _seen_marks(self, dataset: Dataset, experts: Dataset) -> tuple[np.ndarray, np.ndarray]:
+        of_experts = np.full((len(self), 2, 2), np.nan, np.float32)
+        if experts.marks is not None:
+            scale = dataset.image_size / experts.image_size
+            of_experts = scale * (experts.marks[self.sources, self.times] + 0.5) - 0.5
+        steps = dataset.steps(self.sources, self.times)
+        of_targets, of_contexts = np.full((2, *of_experts.shape), np.nan, np.float32)
+        for n, (clip, step) in enumerate(zip(self.targets, steps, strict=True)):
+            first, now, last = (find_object(dataset.frames[clip, at]) for at in (0, step, -1))
+            of_targets[n, :2], of_contexts[n, :2] = (now, last), (first, last)
+        return np.concatenate((of_experts, of_targets)), of_contexts
 
     def contexts(self, dataset: Dataset) -> np.ndarray:
         """o_0^j, uint8 (N, H, W, 3); of pairs of one frame each."""
@@ -53,7 +74,14 @@ class FramePairs:
 
 
 def training_pairs(dataset: Dataset, rng: np.random.Generator, count: int) -> FramePairs:
-    """``count`` pairs: any two different clips of the training split and of one choice, at a random time."""
+    """``count`` pairs: any two different clips of the training split and of one choice, at a random time.
+
+    Other experts' clips are paired with any of the set's own.
+    """
+    if dataset.experts:
+        shown, own = dataset.experts.split("train"), dataset.split("train")
+        times = rng.integers(dataset.experts.length, size=count)
+        return FramePairs(rng.choice(shown, count), rng.choice(own, count), times)
     groups = dataset.same_choice(dataset.split("train"))
     clips, sizes = np.concatenate(groups), [len(group) for group in groups]
     # Of each clip: where its group starts among ``clips``, and the size of its group.
@@ -82,7 +110,8 @@ def validation_pairs(dataset: Dataset, rng: np.random.Generator, count: int) -> 
     """``count`` fixed frame pairs: the validation clips' pairs in turn, each at a random time."""
     pairs = np.array(clip_pairs(dataset, "validation"))
     chosen = pairs[np.arange(count) % len(pairs)]
-    return FramePairs(chosen[:, 0], chosen[:, 1], rng.integers(dataset.length, size=count))
+    length = (dataset.experts or dataset).length
+    return FramePairs(chosen[:, 0], chosen[:, 1], rng.integers(length, size=count))
 
 
 def training_triplets(dataset: Dataset, rng: np.random.Generator, count: int, times: int) -> FramePairs:
