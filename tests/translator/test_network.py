@@ -7,6 +7,7 @@ import torch
 from torch.nn import functional as F
 
 from anyview.runtime.errors import AnyviewError
+from anyview.translator.architectures import make_translator
 from anyview.translator.network import ContextTranslator
 
 # Per architecture: image size, width, convolutions (in, out, map size), fractional ones (in with skip, out).
@@ -183,4 +184,4 @@ def test_simulation_architectures_have_no_dropout():
 @pytest.mark.parametrize(("architecture", "size"), [("real", 50), ("compact", 40), ("sim", 0), ("tiny", 64)])
 def test_impossible_models_are_refused(architecture, size):
     with pytest.raises(AnyviewError, match=architecture):
-        ContextTranslator(architecture, size)
+        make_translator(architecture, size)
