@@ -140,7 +140,6 @@ class TranslatorObjective:
         self, model: Translator, dataset: Dataset, pairs: FramePairs
     ) -> tuple[Tensor, Tensor, Tensor | None]:
         """o_t^i, o_t^j (2N, 3, H, W); o_0^j (N, 3, H, W); frames of the clips i to embed (N, K, 3, H, W)."""
-
         device = next(model.parameters()).device
 
         def load(frames: np.ndarray) -> Tensor:
