@@ -8,7 +8,6 @@ from torch import Tensor
 from anyview.runtime.errors import AnyviewError
 from anyview.runtime.models import read_description, read_weights, write_model
 from anyview.translator.architectures import Translator, make_translator
-from anyview.translator.network import ContextTranslator
 
 _LARGEST = 256  # pixels
 
@@ -43,7 +42,7 @@ def load_translator(folder: Path) -> Translator:
     model = make_translator(meta["architecture"], meta["image_size"], meta.get("task_embedding") is True)
 
     def restore(state: dict[str, Tensor]) -> None:
-        if isinstance(model, ContextTranslator) and model.shared:
+        if model.shared:
             state |= {name.replace("expert_encoder.", "context_encoder.", 1): state[name] for name in state}
         model.load_state_dict(state)
 
