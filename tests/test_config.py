@@ -112,7 +112,7 @@ def test_the_committed_params_are_sound():
         (
             "beyond.cells.human.own_clips",
             True,
-            "beyond.cells.human: other experts' clips are the same for every context, and no clock's",
+            "beyond.cells.human.experts: other experts' clips are the same for every context, and no clock's",
         ),
         (
             "beyond.sets.wide",

@@ -45,11 +45,12 @@ def small_study(root: Path, folder: Path, *tasks: str) -> None:
     for task in tasks:
         beyond["sets"][task] = {"task": task, "contexts": "diverse", "demos": 6}
         beyond["split"][task] = {"validation": 2}
-        translator = beyond["translators"]["sim-reach"] | {"dataset": task, "iterations": 2}
+        translator = beyond["translators"]["sim-reach"] | {"dataset": task, "experts": task, "iterations": 2}
         beyond["translators"][f"sim-{task}"] = translator | {
             "pretraining": {"dataset": task, "iterations": 0}
         }
-        cell = beyond["cells"]["reach"] | {"dataset": task, "model": f"sim-{task}", "demonstrations": 2}
+        cell = beyond["cells"]["reach"] | {"dataset": task, "experts": task, "model": f"sim-{task}"}
+        cell |= {"demonstrations": 2}
         beyond["cells"][task] = cell
     with (folder / "params.yaml").open("w") as handle:
         yaml.dump(params, handle)

@@ -401,12 +401,6 @@ class BeyondCell(DemonstrationCell):
         default="evaluation", description="the random stream that the contexts are drawn from"
     )
 
-    @model_validator(mode="after")
-    def _experts_for_all(self) -> "BeyondCell":
-        if self.other_experts and (self.own_clips or self.reward == "clock"):
-            raise ValueError("other experts' clips are the same for every context, and no clock's")
-        return self
-
     @property
     def other_experts(self) -> str | None:
         """The set of the clips that are imitated if it is not `dataset`."""
@@ -529,6 +523,7 @@ def parse_params(values: Any, name: str = "params.yaml") -> Params:
             listed = ", ".join(fitting) or "none yet"
             raise AnyviewError(f"{name}: {key}: {_brief(found)} is none of these: {listed}")
     _refuse_pretraining_alone(params, name)
+    _refuse_experts_of_one(params, name)
     return params
 
 
@@ -566,6 +561,16 @@ def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
         fitting = params.embeddings if cell.reward == "embedding" else params.translators
         yield f"imitation.cells.{key}.model", cell.model, fitting
     yield from (("evidence.translators", name, params.translators) for name in params.evidence.translators)
+
+
+def _refuse_experts_of_one(params: Params, name: str) -> None:
+    """Refuse other experts for a cell of whose contexts each would need clips of its own, or none."""
+    for key, cell in params.beyond.cells.items():
+        if cell.other_experts and (cell.own_clips or cell.reward == "clock"):
+            raise AnyviewError(
+                f"{name}: beyond.cells.{key}.experts: other experts' clips are the same for every context, "
+                "and no clock's"
+            )
 
 
 def _refuse_pretraining_alone(params: Params, name: str) -> None:

@@ -1,7 +1,7 @@
 """Even exposure: what stands still looks as in the first frame, whatever moves in front of it."""
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from anyview.ingest.exposure import even_exposure
@@ -37,6 +37,7 @@ def test_what_stands_still_looks_as_at_first(seed, moving, gains):
     )
     evened = even_exposure(seen)
     still = ~touched
+    assume(still.mean() > 0.5)  # the greater part of a picture
     before, after = (clip[:, still].astype(float).mean(axis=1) for clip in (seen, evened))
     np.testing.assert_allclose(after, np.broadcast_to(after[0], after.shape), atol=1.0)
     np.testing.assert_array_equal(evened[0], seen[0])

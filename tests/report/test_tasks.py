@@ -48,4 +48,4 @@ def test_methods_of_other_tasks_are_not_compared_with_ours(beyond):
     tree = json.loads((beyond / "metrics/beyond.json").read_text())
     assert set(tree["tasks"]) == {name for task in TASKS for name in (task, f"{task}-oracle")}
     assert tree["tasks"]["reach"]["success_rate"] < tree["tasks"]["reach-oracle"]["success_rate"]
-    assert set(tree["clock"]) == {"ours"}
+    assert set(tree["imitation"]) == {"ours"}
