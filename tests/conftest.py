@@ -110,6 +110,15 @@ class Study:
         shutil.copytree(self.folder, folder / "study", symlinks=True, ignore=left_out)
         return Study(folder / "study", folder / "scratch")
 
+    def clone(self, folder: Path) -> "Study":
+        """A second machine: what Git has, an empty DVC cache, an empty scratch folder."""
+        self.run("git", "add", "-A")
+        self.run(
+            "git", "-c", "user.name=a", "-c", "user.email=a@example.org", "commit", "-q", "-m", "results"
+        )
+        self.run("git", "clone", "-q", str(self.folder), str(folder))
+        return Study(folder, folder.with_name("other-scratch"))
+
 
 @pytest.fixture(scope="session")
 def trunk(tmp_path_factory) -> Study:

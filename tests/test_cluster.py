@@ -2,13 +2,11 @@
 
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from urllib.request import Request, urlopen
 
 import pytest
 
 from tests.clusters import two_nodes
-from tests.conftest import Study
 from tests.long_stages import LONG_STAGES, change, digests
 
 
@@ -51,37 +49,6 @@ def test_a_cluster_that_is_not_there_is_told(study):
     assert "Traceback" not in complaint
 
 
-def clone(study: Study, folder: Path) -> Study:
-    """A second machine: what Git has, an empty DVC cache, an empty scratch folder."""
-    study.run("git", "add", "-A")
-    study.run("git", "-c", "user.name=a", "-c", "user.email=a@example.org", "commit", "-q", "-m", "results")
-    study.run("git", "clone", "-q", str(study.folder), str(folder))
-    return Study(folder, folder.with_name("other-scratch"))
-
-
-def test_results_travel_through_a_shared_folder(smoke, tmp_path):
-    """``dvc push`` here, ``dvc pull`` there: the same bytes, and nothing to run again."""
-    study = smoke.copy(tmp_path)
-    study.run("dvc", "remote", "add", "--default", "shared", str(tmp_path / "remote"))
-    study.run("dvc", "push")
-    other = clone(study, tmp_path / "clone")
-    other.run("dvc", "pull")
-    assert digests(other.folder / "data") == digests(study.folder / "data")
-    assert "up to date" in other.run("dvc", "repro")
-
-
-def test_another_clone_can_use_the_run_cache(smoke, tmp_path):
-    """Without the lock file: ``dvc repro`` recognises what somebody else has run, and fetches it."""
-    study = smoke.copy(tmp_path)
-    study.run("dvc", "remote", "add", "--default", "shared", str(tmp_path / "remote"))
-    study.run("dvc", "push", "--run-cache")
-    other = clone(study, tmp_path / "clone")
-    (other.folder / "dvc.lock").unlink()
-    other.run("dvc", "pull", "--run-cache", "--allow-missing")
-    said = other.run("dvc", "repro", "--pull", "simulate@narrow")
-    assert "Stage 'simulate@narrow' is cached" in said
-
-
 @pytest.fixture
 def bucket(monkeypatch) -> Iterator[tuple[str, str]]:
     """A bucket of an S3-compatible server on this machine: (its URL, the server's address)."""
@@ -103,7 +70,7 @@ def test_results_travel_through_an_s3_bucket(study, tmp_path, bucket):
     study.run("dvc", "remote", "add", "--default", "shared", url)
     study.run("dvc", "remote", "modify", "shared", "endpointurl", address)
     study.run("dvc", "push", "--with-deps", "imitate@ours")
-    other = clone(study, tmp_path / "clone")
+    other = study.clone(tmp_path / "clone")
     other.run("dvc", "pull", "--with-deps", "imitate@ours")
     for folder in ("clips/diverse", "models/sim", "policies/ours"):
         assert digests(other.folder / "data" / folder) == digests(study.folder / "data" / folder) != {}

@@ -1,4 +1,4 @@
-"""The smoke profile through the real ``dvc repro``, in a clone."""
+"""The smoke profile through the real ``dvc repro``, in a clone, and from there to other machines."""
 
 import json
 import math
@@ -159,3 +159,26 @@ def test_metrics_of_imitation(smoke, metrics):
             low, mean, high = (values[measure + bound] for bound in ("_low", "", "_high"))
             assert low <= mean <= high, (name, measure)
         assert ("return_expert" in values) == (cells[name].reward not in ("tpil", "gail"))
+
+
+def test_results_travel_through_a_shared_folder(smoke, tmp_path):
+    """``dvc push`` here, ``dvc pull`` there: the same bytes, and nothing to run again."""
+    study = smoke.copy(tmp_path)
+    study.run("dvc", "remote", "add", "--default", "shared", str(tmp_path / "remote"))
+    study.run("dvc", "push")
+    other = study.clone(tmp_path / "clone")
+    other.run("dvc", "pull")
+    assert digests(other.folder / "data") == digests(study.folder / "data")
+    assert "up to date" in other.run("dvc", "repro")
+
+
+def test_another_clone_can_use_the_run_cache(smoke, tmp_path):
+    """Without the lock file: ``dvc repro`` recognises what somebody else has run, and fetches it."""
+    study = smoke.copy(tmp_path)
+    study.run("dvc", "remote", "add", "--default", "shared", str(tmp_path / "remote"))
+    study.run("dvc", "push", "--run-cache")
+    other = study.clone(tmp_path / "clone")
+    (other.folder / "dvc.lock").unlink()
+    other.run("dvc", "pull", "--run-cache", "--allow-missing")
+    said = other.run("dvc", "repro", "--pull", "simulate@narrow")
+    assert "Stage 'simulate@narrow' is cached" in said
