@@ -1,7 +1,7 @@
 """Even exposure: what stands still looks as in the first frame, whatever moves in front of it."""
 
 import numpy as np
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from anyview.ingest.exposure import even_exposure
@@ -13,11 +13,11 @@ GAIN = st.floats(0.8, 1.2)
 
 
 def scene(seed: int, count: int, moving: float) -> tuple[np.ndarray, np.ndarray]:
-    """Light (T, 48, 48, 3) of a mottled table over which something moves, and where it has been (48, 48)."""
+    """Light (T, 48, 48, 3) of a mottled table, something crossing its left; and where that was (48, 48)."""
     rng = stream(seed, "exposure test")
     light = np.repeat(rng.uniform(40, 190, (1, 48, 48, 3)), count, axis=0)
     width, touched = round(48 * moving), np.zeros((48, 48), bool)
-    for index, left in enumerate(rng.integers(0, 49 - width, count)):
+    for index, left in enumerate(rng.integers(0, 20 - width, count)):
         light[index, :, left : left + width] = rng.uniform(20, 200, 3)
         touched[:, left : left + width] = True
     return light, touched
@@ -36,8 +36,7 @@ def test_what_stands_still_looks_as_at_first(seed, moving, gains):
         np.uint8
     )
     evened = even_exposure(seen)
-    still = ~touched
-    assume(still.mean() > 0.5)  # the greater part of a picture
+    still = ~touched  # the greater part of a picture
     before, after = (clip[:, still].astype(float).mean(axis=1) for clip in (seen, evened))
     np.testing.assert_allclose(after, np.broadcast_to(after[0], after.shape), atol=1.0)
     np.testing.assert_array_equal(evened[0], seen[0])
