@@ -5,11 +5,12 @@ Usage: python stages/discriminate.py CELL
 
 from anyview.adversarial import gail, tpil
 from anyview.config import load_params
-from anyview.evaluation.methods import Method
+from anyview.evaluation.methods import MakeLearner, Method
 from anyview.evaluation.stage import evaluate_method
-from anyview.learners import trpo
+from anyview.learners import ddpg, trpo
 from anyview.runtime.errors import choose, run_stage
 
+LEARNERS: dict[str, MakeLearner] = {"ddpg": ddpg.make_learner, "trpo": trpo.make_learner}
 REWARDS = {"gail": gail.make_reward, "tpil": tpil.make_reward}
 
 
@@ -18,7 +19,7 @@ def main(arguments: list[str]) -> None:
     params = load_params()
     cells = params.adversarial.cells
     name = choose(arguments, cells, "python stages/discriminate.py CELL")
-    method = Method(trpo.make_learner, REWARDS[cells[name].reward])
+    method = Method(LEARNERS[cells[name].learner], REWARDS[cells[name].reward])
     evaluate_method(name, params, method, sources=[])
 
 

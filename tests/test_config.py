@@ -193,8 +193,8 @@ def test_the_committed_params_are_sound():
         ("real.ingest.rate", math.inf, "real.ingest.rate: Input should be a finite number, got inf"),
         (
             "adversarial.cells.tpil.learner",
-            "ddpg",
-            "adversarial.cells.tpil.learner: Input should be 'trpo', got 'ddpg'",
+            "ppo",
+            "adversarial.cells.tpil.learner: Input should be 'ddpg' or 'trpo', got 'ppo'",
         ),
         (
             "imitation.cells.ours.weights",

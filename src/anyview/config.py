@@ -287,7 +287,14 @@ class Discriminator(Block):
 
     batch_size: Count
     learning_rate: Positive
-    steps: Count = Field(description="steps of the discriminator after the episodes of each policy step")
+    steps: Count = Field(description="steps of the discriminator after each iteration")
+    memory: Count = Field(
+        description="newest episodes that it learns from, and that it then scores anew for the learner"
+    )
+    gradient_penalty: NonNegative = Field(
+        description="weight of half the squared gradients of its logits by the frames of expert and agent; "
+        "0 leaves it out"
+    )
     domain_weight: NonNegative = Field(description="gradient reversal of TPIL's domain head")
 
 
@@ -370,7 +377,7 @@ class Imitation(Block):
 class AdversarialCell(Block):
     """One method whose reward a discriminator learns while the agent does."""
 
-    learner: Literal["trpo"] = Field(description="discriminators learn from the batches of trpo")
+    learner: Literal["ddpg", "trpo"]
     reward: Literal["tpil", "gail"]
 
 

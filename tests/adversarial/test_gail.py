@@ -10,9 +10,9 @@ from anyview.adversarial.gail import FrameDiscriminator, gail_reward
 from tests.learners.toy import LAST, PARAMS, SIZE, clip_set, expert_motion, random_motion, show, squares
 
 
-def make(runs: list[int], episodes: int = 4) -> LearnedReward:
+def make(runs: list[int]) -> LearnedReward:
     experts = [clip_set(squares(expert_motion(3)))] * len(runs)
-    return gail_reward(PARAMS, seed=3, runs=runs, experts=experts, episodes=episodes)
+    return gail_reward(PARAMS, seed=3, runs=runs, experts=experts)
 
 
 def agents(runs: list[int], iteration: int, copies: int = 2) -> np.ndarray:
@@ -71,14 +71,17 @@ def test_it_sees_when_a_frame_comes_too_late():
     assert measures["agent_accuracy"][0] > 0.9
 
 
-def test_rewards_stay_as_they_are_while_a_batch_is_gathered():
-    reward = make([0], episodes=4)
-    clips = agents([0], 0)
-    first = show(reward, clips)
-    reward.end_iteration()
-    np.testing.assert_array_equal(show(reward, clips), first)  # 2 of 4 episodes gathered
-    reward.end_iteration()
-    assert (show(reward, clips) != first).any()
+def test_the_newest_episodes_are_rescored_by_what_it_has_learned_since():
+    reward = make([0, 1])
+    clips = [agents([0, 1], iteration) for iteration in range(3)]  # of 2 episodes each; it remembers 4
+    earned = []
+    for each in clips:
+        earned.append(show(reward, each))
+        reward.end_iteration()
+    rescored = reward.rescored()
+    now = np.concatenate([show(reward, each) for each in clips[1:]], axis=1)
+    np.testing.assert_allclose(rescored, now, rtol=1e-4, atol=1e-6)
+    assert (rescored[:, :2] != earned[1]).any()
 
 
 def test_a_run_among_others_is_the_same_run_alone():
@@ -91,7 +94,7 @@ def test_a_run_among_others_is_the_same_run_alone():
 def test_a_restored_reward_continues_bit_for_bit():
     runs = [0, 2]
     reward = make(runs)
-    practise(reward, runs, range(5))  # has learned twice, and half a batch waits
+    practise(reward, runs, range(5))
     stored = save({name: np.ascontiguousarray(array) for name, array in reward.state().items()})
     rest = practise(reward, runs, range(5, 9))
     resumed = make(runs)

@@ -63,7 +63,7 @@ def make(domain_weight: float = 0.2) -> tpil.LearnedReward:
     experts = [clip_set(squares(expert_motion(3), ground=40))]
     bystanders = [clip_set(squares(random_motion(8, 50), ground=40))]
     params = PARAMS.model_copy(update={"domain_weight": domain_weight})
-    return tpil_reward(params, 3, [0], experts, bystanders, episodes=4)
+    return tpil_reward(params, 3, [0], experts, bystanders)
 
 
 def test_a_step_is_judged_with_the_frame_three_steps_before():

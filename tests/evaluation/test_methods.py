@@ -25,7 +25,7 @@ from anyview.video.pixels import to_input
 from anyview.video.sets import write_set, write_shard
 
 METHODS = {
-    "gail": Method(trpo.make_learner, gail.make_reward),
+    "gail": Method(ddpg.make_learner, gail.make_reward),
     "tpil": Method(trpo.make_learner, tpil.make_reward),
     "tcn": Method(ddpg.make_learner, make_reward),
 }

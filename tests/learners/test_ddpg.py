@@ -17,7 +17,15 @@ from anyview.learners.ddpg import (
     policy_loss,
 )
 from anyview.pusher.contexts import Context
-from tests.learners.tracking import ACTION, HORIZON, OBSERVATION, Tracking, mean_distance, practise
+from tests.learners.tracking import (
+    ACTION,
+    HORIZON,
+    OBSERVATION,
+    Tracking,
+    mean_distance,
+    practise,
+    practise_rescored,
+)
 
 PARAMS = config.DDPG(
     hidden=[32, 32],
@@ -74,6 +82,17 @@ def test_resumes_bit_for_bit() -> None:
     practise(resumed, world, 3)
     for name, weights in whole.policy().items():
         np.testing.assert_array_equal(resumed.policy()[name], weights)
+
+
+@pytest.mark.parametrize("n", [1, 3])
+def test_rescored_rewards_replace_those_recorded_and_older_episodes_are_not_used(n: int) -> None:
+    runs, memory = [0, 1], 6
+    heard = make(runs, copies=2, n_step=n, replay=memory * HORIZON)
+    practise(heard, Tracking(runs, 2), 5)
+    told = make(runs, copies=2, n_step=n)
+    practise_rescored(told, Tracking(runs, 2), 5, memory)
+    for name, weights in heard.policy().items():
+        np.testing.assert_array_equal(told.policy()[name], weights)
 
 
 @pytest.mark.parametrize("n", [1, 3, 49])

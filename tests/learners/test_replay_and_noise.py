@@ -21,6 +21,11 @@ def test_replay_holds_the_newest_rows_in_order(sizes: list[int], capacity: int) 
     taken = replay.take(torch.arange(replay.size).expand(2, -1))[..., 0]
     assert taken[0].tolist() == expected
     assert taken[1].tolist() == [-row for row in expected]
+    newest = min(sizes[0], replay.size)
+    replay.rewrite(0, torch.arange(2.0 * newest).view(2, newest))
+    taken = replay.take(torch.arange(replay.size).expand(2, -1))[..., 0]
+    rewritten = [2 * newest - 1 - age for age in range(newest)]
+    assert taken[1].tolist() == rewritten + [-row for row in expected[newest:]]
 
 
 def test_noise_is_stationary_with_unit_variance_and_the_stated_memory() -> None:

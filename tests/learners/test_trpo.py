@@ -228,6 +228,26 @@ def test_a_restored_learner_continues_bit_for_bit():
         np.testing.assert_array_equal(resumed.state()[name], array)
 
 
+def test_rescored_rewards_replace_those_recorded():
+    """One learner hears of its rewards step by step, the other when episodes have ended."""
+    heard, told = learner_of([0, 1]), learner_of([0, 1])
+    world, rng = Tracking([0, 1]), np.random.default_rng(0)
+    observations = np.stack([world.observe(step) for step in range(HORIZON + 1)])
+    known = np.zeros((2, 0, HORIZON), np.float32)
+    for _ in range(4):
+        rewards = rng.normal(size=(HORIZON, 2, 4)).astype(np.float32)
+        for learner in (heard, told):
+            for step in range(1, HORIZON + 1):
+                learner.act(observations[step - 1], explore=True)
+                now = rewards[step - 1] if learner is heard else 0 * rewards[step - 1]
+                learner.record(observations[step - 1], np.zeros((2, 4, 1)), now, observations[step], step)
+        known = np.concatenate([known, np.moveaxis(rewards, 0, -1)], axis=1)
+        heard.end_iteration()
+        told.end_iteration(known)
+    np.testing.assert_array_equal(told.state()["theta"], heard.state()["theta"])
+    assert (heard.state()["theta"] != learner_of([0, 1]).state()["theta"]).any()
+
+
 def test_acting_without_exploration_changes_nothing():
     learner, other = learner_of([0]), learner_of([0])
     world, same = Tracking([0]), Tracking([0])

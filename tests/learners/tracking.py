@@ -53,6 +53,21 @@ def practise(learner: Learner, world: Tracking, iterations: int) -> None:
         learner.end_iteration()
 
 
+def practise_rescored(learner: Learner, world: Tracking, iterations: int, memory: int) -> None:
+    """As ``practise``, but rewards become known with the episode's end, of the newest ``memory`` episodes."""
+    known = np.zeros((world.shape[0], 0, HORIZON), np.float32)
+    for _ in range(iterations):
+        observations, earned = world.reset(), []
+        for step in range(1, HORIZON + 1):
+            actions = learner.act(observations, explore=True)
+            next_observations, rewards = world.step(actions)
+            learner.record(observations, actions, np.zeros_like(rewards), next_observations, step)
+            observations = next_observations
+            earned.append(rewards)
+        known = np.concatenate([known, np.stack(earned, axis=-1)], axis=1)[:, -memory:].astype(np.float32)
+        learner.end_iteration(known)
+
+
 def mean_distance(learner: Learner, world: Tracking) -> np.ndarray:
     """Mean distance (R,) to the path over an episode without noise."""
     observations, distances = world.reset(), []

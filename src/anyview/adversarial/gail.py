@@ -61,12 +61,12 @@ class FrameDiscriminator(Discriminator):
 
 
 def gail_reward(
-    params: config.Discriminator, seed: int, runs: Sequence[int], experts: Sequence[ClipSet], episodes: int
+    params: config.Discriminator, seed: int, runs: Sequence[int], experts: Sequence[ClipSet]
 ) -> LearnedReward:
-    """The reward of ``runs``, each with its set of expert clips; learns every ``episodes`` episodes."""
+    """The reward of ``runs``, each with its set of expert clips."""
     size = experts[0].frames.shape[2]
     sets = [{"expert": clips} for clips in experts]
-    return LearnedReward(lambda: FrameDiscriminator(size), params, seed, runs, sets, episodes)
+    return LearnedReward(lambda: FrameDiscriminator(size), params, seed, runs, sets)
 
 
 def make_reward(group: Group) -> Scoring:
@@ -74,6 +74,5 @@ def make_reward(group: Group) -> Scoring:
     frames, rows, _ = training_clips(group.params)
     params, runs = group.params, group.runs
     experts = [ClipSet(frames, rows)] * len(runs)
-    episodes = params.imitation.trpo.batch_episodes
-    reward = gail_reward(params.adversarial.discriminator, params.base.seed, runs, experts, episodes)
+    reward = gail_reward(params.adversarial.discriminator, params.base.seed, runs, experts)
     return Scoring(reward, np.ones(len(runs)), first_demonstration(group), fixed=False)

@@ -121,17 +121,14 @@ def tpil_reward(
     runs: Sequence[int],
     experts: Sequence[ClipSet],
     bystanders: Sequence[ClipSet],
-    episodes: int,
 ) -> LearnedReward:
-    """The reward of ``runs``, each with expert and bystander clips; learns every ``episodes`` episodes."""
+    """The reward of ``runs``, each with expert and bystander clips."""
     size = experts[0].frames.shape[2]
     sets = [
         {"expert": expert, "bystander": bystander}
         for expert, bystander in zip(experts, bystanders, strict=True)
     ]
-    return LearnedReward(
-        lambda: PairDiscriminator(size, params.domain_weight), params, seed, runs, sets, episodes
-    )
+    return LearnedReward(lambda: PairDiscriminator(size, params.domain_weight), params, seed, runs, sets)
 
 
 def wrong_pushes(contexts: Sequence[Context], rng: np.random.Generator, image_size: int) -> np.ndarray:
@@ -157,5 +154,5 @@ def make_reward(group: Group) -> Scoring:
     experts = [ClipSet(frames, rows)] * len(runs)
     bystanders = [ClipSet(pushes, np.arange(len(pushes)))] * len(runs)
     discriminator, seed = params.adversarial.discriminator, params.base.seed
-    reward = tpil_reward(discriminator, seed, runs, experts, bystanders, params.imitation.trpo.batch_episodes)
+    reward = tpil_reward(discriminator, seed, runs, experts, bystanders)
     return Scoring(reward, np.ones(len(runs)), first_demonstration(group), fixed=False)

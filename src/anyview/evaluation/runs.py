@@ -120,8 +120,9 @@ def _train(
     with track(label, params.iterations, start) as progress:
         for iteration in range(start + 1, params.iterations + 1):
             earned = explore(acting, learner, scoring.reward, len(group.runs))
-            learner.end_iteration()
-            since.append({"return": earned * scoring.scales, **scoring.reward.end_iteration()})
+            learned = scoring.reward.end_iteration()
+            learner.end_iteration(scoring.reward.rescored())
+            since.append({"return": earned * scoring.scales, **learned})
             note = ""
             if iteration in points:
                 distance = _final_distance(testing, learner)

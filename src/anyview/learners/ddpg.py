@@ -55,21 +55,26 @@ def n_step_transitions(
     discount: float,
     n: int,
 ) -> Transitions:
-    """Transitions (T, ..., width) of episodes of T steps: (T, ..., O), (T, ..., A), (T, ...), (T, ..., O).
-
-    The return at step t sums discount^k r_(t+k) over n steps or to the end of the episode, which has nothing
-    after it.
-    """
-    horizon = len(rewards)
-    returns = torch.zeros_like(rewards)
-    for k in range(min(n, horizon)):
-        returns[: horizon - k] += discount**k * rewards[k:]
+    """Transitions (T, ..., width) of episodes of T steps: (T, ..., O), (T, ..., A), (T, ...), (T, ..., O)."""
+    horizon, returns = len(rewards), n_step_returns(rewards, discount, n)
     ends = torch.arange(horizon, device=rewards.device).add(n).clamp(max=horizon)  # steps taken by then
     weights = torch.where(ends < horizon, discount**n, 0.0).view(-1, *[1] * rewards.ndim)
     bootstrap_discounts = weights.expand(*rewards.shape, 1)
     return Transitions(
         observations, actions, returns[..., None], next_observations[ends - 1], bootstrap_discounts
     )
+
+
+def n_step_returns(rewards: Tensor, discount: float, n: int) -> Tensor:
+    """Returns (T, ...) of episodes of T steps with ``rewards`` (T, ...).
+
+    At step t it sums discount^k r_(t+k) over n steps or to the end of the episode, which has nothing after
+    it.
+    """
+    returns = torch.zeros_like(rewards)
+    for k in range(min(n, len(rewards))):
+        returns[: len(rewards) - k] += discount**k * rewards[k:]
+    return returns
 
 
 def minibatch_ages(
@@ -170,8 +175,12 @@ class DDPG:
         transition = (observations, actions, rewards, next_observations)
         self._episode.append(tuple(map(self._tensor, transition)))
 
-    def end_iteration(self) -> None:
-        """Store the episodes; then take the iteration's updates."""
+    def end_iteration(self, rescored: np.ndarray | None = None) -> None:
+        """Store the episodes; then take the iteration's updates.
+
+        Where the reward has learned, batches are of the ``rescored`` (R, E, T) episodes alone: rewards of one
+        scale, as in discriminator-actor-critic (Kostrikov et al. 2019).
+        """
         params = self._params
         observations, actions, rewards, next_observations = (
             torch.stack(each) for each in zip(*self._episode, strict=True)
@@ -181,15 +190,27 @@ class DDPG:
         )
         rows = torch.cat(transitions, dim=-1).permute(1, 2, 0, 3)  # one episode after the other
         self._replay.add(rows.flatten(1, 2))
+        usable = self._replay.size
+        if rescored is not None:
+            usable = self._rescore(rescored)
         self._iteration += 1
         if self._iteration * self._copies >= params.warmup_episodes:
-            for ages in self._minibatches():
+            for ages in self._minibatches(usable):
                 self._update(Transitions(*self._replay.take(ages).split(self._widths, dim=-1)))
         self._begin()
 
-    def _minibatches(self) -> Tensor:
-        """The ages (updates, R, B) of the iteration's batches."""
-        params, size = self._params, self._replay.size
+    def _rescore(self, rewards: np.ndarray) -> int:
+        """Give the newest episodes the returns of ``rewards`` (R, E, T); the number of their rows."""
+        params = self._params
+        episodes = self._replay.size // self._horizon
+        steps = self._tensor(rewards[:, -episodes:]).permute(2, 0, 1)  # (T, R, E)
+        returns = n_step_returns(steps, params.discount, params.n_step).permute(1, 2, 0).flatten(1)
+        self._replay.rewrite(self._widths[0] + self._widths[1], returns)
+        return returns.shape[1]
+
+    def _minibatches(self, size: int) -> Tensor:
+        """The ages (updates, R, B) of the iteration's batches, of the newest ``size`` transitions."""
+        params = self._params
         updates = round(params.updates_per_step * self._horizon * self._copies)
         newest = min(size, params.recent_episodes * self._horizon)
         drawn = [

@@ -231,8 +231,11 @@ class TRPO:
         self._episode.append((observations, self._intended, rewards))
         self._intended = None
 
-    def end_iteration(self) -> None:
-        """Add the iteration's episodes to the batch; take a policy step when the batch is full."""
+    def end_iteration(self, rescored: np.ndarray | None = None) -> None:
+        """Add the iteration's episodes to the batch; take a policy step when the batch is full.
+
+        Where the reward has learned, the batch's newest episodes earn what ``rescored`` (R, E, T) says.
+        """
         if len(self._episode) != self._horizon:
             raise ValueError(f"an iteration ended after {len(self._episode)} of {self._horizon} steps")
         for key, parts in zip(self._batch, zip(*self._episode, strict=True), strict=True):
@@ -240,6 +243,9 @@ class TRPO:
             self._batch[key] = np.concatenate([self._batch[key], episodes], axis=1)
         self._episode, self._noise = [], None
         self._iteration += 1
+        if rescored is not None:
+            known = min(rescored.shape[1], self._batch["rewards"].shape[1])
+            self._batch["rewards"][:, -known:] = rescored[:, -known:]
         if self._batch["rewards"].shape[1] >= self._params.batch_episodes:
             self._improve()
             self._batch = self._empty(self._batch["observations"].shape[-1])

@@ -1,6 +1,6 @@
 """Rewards learned from video alone: one discriminator a run tells the expert's frames from the agent's.
 
-What GAIL and TPIL share: gathering the agent's episodes, drawing batches, training side by side, checkpoints.
+What GAIL and TPIL share: memory of the agent's episodes, batches, training side by side, checkpoints.
 Shapes: R runs, C copies of a run's context, T actions an episode, B a batch; frames are uint8 RGB (H, W, 3).
 """
 
@@ -37,10 +37,13 @@ class ClipSet:
     def draw(self, rng: np.random.Generator, count: int, lag: int) -> Views:
         """``count`` views of random clips at random times 1 to T."""
         clips, last = rng.choice(self.rows, count), self.frames.shape[1] - 1
-        times = rng.integers(1, last + 1, size=count)
+        return self.views(clips, rng.integers(1, last + 1, size=count), lag)
+
+    def views(self, clips: np.ndarray, times: np.ndarray, lag: int) -> Views:
+        """The views of ``clips`` (B,) at ``times`` (B,)."""
         now = to_input(self.frames[clips, times])
         before = to_input(self.frames[clips, np.maximum(times - lag, 1)]) if lag else now
-        return Views(before, now, torch.from_numpy(times / last).float())
+        return Views(before, now, torch.from_numpy(times / (self.frames.shape[1] - 1)).float())
 
 
 class Discriminator(nn.Module):
@@ -74,12 +77,24 @@ def cross_entropy(logits: Tensor, label: float) -> Tensor:
     return F.binary_cross_entropy_with_logits(logits, torch.full_like(logits, label))
 
 
+def gradient_penalty(network: Discriminator, views: Views) -> Tensor:
+    """Half the mean of |d logits / d frames|^2 over a batch, a scalar (R1 and R2 of Mescheder et al. 2018).
+
+    Without it logits jump wherever two frames differ, and the reward does not say by how much they do.
+    """
+    before, now = (frames.clone().requires_grad_() for frames in (views.before, views.now))
+    logits = network.logits(Views(before, now, views.time))
+    gradients = torch.autograd.grad(logits.sum(), [before, now], create_graph=True, materialize_grads=True)
+    squares = torch.stack([gradient.flatten(1).square().sum(1) for gradient in gradients])
+    return squares.sum(0).mean() / 2
+
+
 class LearnedReward:
     """What R discriminators make of the agents' frames; see ``interfaces.RewardSource``.
 
-    They stay as they are while ``episodes`` episodes of each run are gathered, as many as the learner takes
-    for one policy step, so that all rewards of a policy step have one scale. Then each takes ``params.steps``
-    Adam steps on batches of these episodes and of ``sets[r]``, run r's sets of others' clips by name.
+    After an iteration each takes ``params.steps`` Adam steps on batches of the newest ``params.memory``
+    episodes of its agent, all of the iteration's at least, and of ``sets[r]``, run r's sets of others' clips
+    by name. These episodes are then rescored, so that all rewards that a learner hears of have one scale.
     ``networks`` are the discriminators, one a run.
     """
 
@@ -90,10 +105,8 @@ class LearnedReward:
         seed: int,
         runs: Sequence[int],
         sets: Sequence[Mapping[str, ClipSet]],
-        episodes: int,
     ):
-        self._params, self._seed, self._runs = params, seed, list(runs)
-        self._sets, self._episodes = list(sets), episodes
+        self._params, self._seed, self._runs, self._sets = params, seed, list(runs), list(sets)
         self.networks: list[Discriminator] = []
         with torch.random.fork_rng(devices=[]):
             for run in runs:
@@ -104,7 +117,7 @@ class LearnedReward:
         self._shape = sets[0]["expert"].frames.shape[1:]
         self._iteration = 0
         self._seen = np.zeros((len(self._runs), 0, *self._shape), np.uint8)
-        self._gathered = self._seen
+        self._memory = self._seen
 
     @torch.inference_mode()
     def step(self, frames: np.ndarray, step: int) -> np.ndarray:
@@ -121,30 +134,48 @@ class LearnedReward:
         return torch.stack(rewards).numpy()
 
     def end_iteration(self) -> Arrays:
-        """Accuracies (R,) on the iteration's frames, before learning from them when enough are gathered."""
+        """Learn from the newest episodes; accuracies (R,) on the iteration's frames before that."""
         with torch.inference_mode():
             measures = [
                 network.accuracies(self._draw(row, self._seen, "discriminator-measures", self._iteration))
                 for row, network in enumerate(self.networks)
             ]
-        self._gathered = np.concatenate([self._gathered, self._seen], axis=1)
+        kept = max(self._params.memory, self._seen.shape[1])
+        self._memory = np.concatenate([self._memory, self._seen], axis=1)[:, -kept:]
         self._iteration += 1
-        if self._gathered.shape[1] >= self._episodes:
-            for index in range(self._params.steps):
-                self._learn(index)
-            self._gathered = self._gathered[:, :0]
+        for index in range(self._params.steps):
+            self._learn(index)
         return {name: np.array([each[name].item() for each in measures]) for name in measures[0]}
+
+    @torch.inference_mode()
+    def rescored(self) -> np.ndarray:
+        """Rewards (R, E, T) of the remembered episodes."""
+        times = np.arange(1, self._shape[0])
+        rewards = np.zeros((*self._memory.shape[:2], len(times)), np.float32)
+        for network, episodes, earned in zip(self.networks, self._memory, rewards, strict=True):
+            clips = ClipSet(episodes, np.arange(len(episodes)))
+            for index in clips.rows:
+                views = clips.views(np.full(len(times), index), times, network.lag)
+                earned[index] = network.reward(network.logits(views)).numpy()
+        return rewards
 
     def _learn(self, index: int) -> None:
         """One step of every discriminator: a sum of losses that share no weights."""
         batches = (
-            self._draw(row, self._gathered, "discriminator-batch", self._iteration, index)
+            self._draw(row, self._memory, "discriminator-batch", self._iteration, index)
             for row in range(len(self._runs))
         )
-        losses = [network.loss(views) for network, views in zip(self.networks, batches, strict=True)]
+        losses = [self._loss(network, views) for network, views in zip(self.networks, batches, strict=True)]
         self._optimizer.zero_grad()
         torch.stack(losses).sum().backward()
         self._optimizer.step()
+
+    def _loss(self, network: Discriminator, views: Mapping[str, Views]) -> Tensor:
+        """The network's own loss and the penalty on the frames of expert and agent."""
+        loss, weight = network.loss(views), self._params.gradient_penalty
+        if weight:
+            loss = loss + weight * sum(gradient_penalty(network, views[name]) for name in ("expert", "agent"))
+        return loss
 
     def _draw(self, row: int, agent: np.ndarray, name: str, *indices: int) -> dict[str, Views]:
         """A batch of each of run ``row``'s sets and of its ``agent`` clips (R, E, T + 1, H, W, 3)."""
@@ -154,15 +185,15 @@ class LearnedReward:
         return {name: clips.draw(rng, count, lag) for name, clips in sets.items()}
 
     def state(self) -> Arrays:
-        """Between iterations: networks, optimiser and gathered episodes."""
+        """Between iterations: networks, optimiser and remembered episodes."""
         arrays = {f"network/{name}": value.numpy() for name, value in self._modules.state_dict().items()}
         for index, state in self._optimizer.state_dict()["state"].items():
             arrays |= {f"optimizer/{index}/{key}": value.numpy() for key, value in state.items()}
-        return arrays | {"gathered": self._gathered, "iteration": np.array([self._iteration])}
+        return arrays | {"memory": self._memory, "iteration": np.array([self._iteration])}
 
     def restore(self, state: Arrays) -> None:
         """Continue from ``state()`` bit for bit."""
-        self._gathered, self._iteration = state["gathered"], int(state["iteration"][0])
+        self._memory, self._iteration = state["memory"], int(state["iteration"][0])
         network: dict[str, Tensor] = {}
         moments: dict[int, dict[str, Tensor]] = {}
         for name, array in state.items():

@@ -31,8 +31,12 @@ class Learner(Protocol):
         """
         ...
 
-    def end_iteration(self) -> None:
-        """All episodes of an iteration have ended."""
+    def end_iteration(self, rescored: np.ndarray | None = None) -> None:
+        """All episodes of an iteration have ended.
+
+        ``rescored`` (R, E, T), where the reward has learned, are the rewards of the newest E episodes as it
+        gives them now, the oldest first. They replace what was recorded.
+        """
         ...
 
     def policy(self) -> Arrays:
@@ -57,6 +61,10 @@ class RewardSource(Protocol):
 
     def end_iteration(self) -> Arrays:
         """Learn from the iteration's frames where the reward is learned; measures (R,) to log by name."""
+        ...
+
+    def rescored(self) -> np.ndarray | None:
+        """Rewards (R, E, T) of the newest E episodes as it gives them now; None where it never changes."""
         ...
 
     def state(self) -> Arrays:

@@ -28,6 +28,12 @@ class Replay:
         """Rows (R, B, W) by ``ages`` (R, B): 0 is the newest row, ``size - 1`` the oldest."""
         return self._rows[self._run, (self.written - 1 - ages) % self._rows.shape[1]]
 
+    def rewrite(self, column: int, values: Tensor) -> None:
+        """Put ``values`` (R, N) into ``column`` of the newest N rows, the oldest of them first."""
+        count, capacity = values.shape[1], self._rows.shape[1]
+        places = (self.written - count + torch.arange(count, device=values.device)) % capacity
+        self._rows[:, places, column] = values
+
     def contents(self) -> Tensor:
         """The rows held (R, size, W) as they lie in memory, for a checkpoint."""
         return self._rows[:, : self.size]

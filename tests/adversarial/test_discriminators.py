@@ -1,0 +1,78 @@
+"""What both discriminators share: the penalty on their gradients, by hand and in training."""
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor, nn
+
+from anyview.adversarial.common.discriminators import Discriminator, Views, gradient_penalty
+from anyview.adversarial.gail import FrameDiscriminator, gail_reward
+from anyview.adversarial.tpil import PairDiscriminator
+from tests.learners.toy import PARAMS, SIZE, clip_set, expert_motion, random_motion, show, squares
+
+NETWORKS = {"gail": lambda: FrameDiscriminator(SIZE), "tpil": lambda: PairDiscriminator(SIZE, 0.2)}
+
+
+class Quadratic(Discriminator):
+    """Logits a |o_t|^2 / 2 + b sum(o_(t - lag)), whose gradients are a o_t and b everywhere."""
+
+    lag = 3
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.weights = nn.Parameter(torch.tensor([0.7, -0.2]))
+
+    def logits(self, views: Views) -> Tensor:
+        a, b = self.weights
+        return a * views.now.flatten(1).square().sum(1) / 2 + b * views.before.flatten(1).sum(1)
+
+
+def batch_of(count: int, lag: int) -> Views:
+    return clip_set(squares(random_motion(3, 1))).draw(np.random.default_rng(0), count, lag)
+
+
+def test_the_penalty_is_half_the_mean_square_of_the_gradient_and_trains_the_network():
+    network, views = Quadratic(), batch_of(5, lag=3)
+    penalty = gradient_penalty(network, views)
+    size = 3 * SIZE**2
+    square = views.now.double().square().flatten(1).sum(1).mean().item()
+    assert penalty.item() == pytest.approx((0.7**2 * square + 0.2**2 * size) / 2, rel=1e-5)
+    penalty.backward()
+    np.testing.assert_allclose(network.weights.grad, [0.7 * square, -0.2 * size], rtol=1e-5)
+
+
+@pytest.mark.parametrize("name", NETWORKS)
+def test_the_penalty_matches_differences_of_the_logits(name: str):
+    torch.manual_seed(0)
+    network = NETWORKS[name]().double()
+    now = torch.rand(1, 3, SIZE, SIZE, dtype=torch.float64) * 2 - 1
+    before, time = now.flip(3) if network.lag else now, torch.tensor([0.5], dtype=torch.float64)
+    count, step = now.numel(), 1e-6
+    nudges = step * torch.eye(count, dtype=torch.float64).view(count, *now.shape[1:])
+
+    def slopes(before_nudges: Tensor, now_nudges: Tensor) -> Tensor:
+        ahead, behind = (
+            network.logits(Views(before + sign * before_nudges, now + sign * now_nudges, time.expand(count)))
+            for sign in (1, -1)
+        )
+        return (ahead - behind) / (2 * step)
+
+    still = torch.zeros_like(nudges)
+    expected = (slopes(nudges, still).square().sum() + slopes(still, nudges).square().sum()) / 2
+    assert gradient_penalty(network, Views(before, now, time)).item() == pytest.approx(
+        expected.item(), rel=1e-4
+    )
+
+
+def test_with_the_penalty_logits_of_expert_and_agent_stay_close():
+    spread = {}
+    for weight in (0.0, 10.0):
+        params = PARAMS.model_copy(update={"gradient_penalty": weight})
+        reward = gail_reward(params, 3, [0], [clip_set(squares(expert_motion(3)))])
+        agent = squares(random_motion(2, 7))[None]
+        for _ in range(20):
+            show(reward, agent)
+            reward.end_iteration()
+        expert = show(reward, squares(expert_motion(2))[None])
+        spread[weight] = expert.mean() - show(reward, agent).mean()
+    assert 0 < spread[10.0] < spread[0.0] / 2
