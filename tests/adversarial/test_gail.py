@@ -28,7 +28,7 @@ def practise(reward: LearnedReward, runs: list[int], iterations: range) -> list[
     return earned
 
 
-def test_loss_and_reward_are_those_of_the_paper():
+def test_loss_is_that_of_the_paper():
     torch.manual_seed(0)
     network = FrameDiscriminator(SIZE)
     rng = np.random.default_rng(0)
@@ -42,9 +42,6 @@ def test_loss_and_reward_are_those_of_the_paper():
     }
     expected = -np.log(d["expert"]).mean() - np.log(1 - d["agent"]).mean()
     assert network.loss(batch).item() == pytest.approx(expected, rel=1e-5)
-    np.testing.assert_allclose(
-        network.reward(network.logits(batch["agent"])).detach(), -np.log(1 - d["agent"]), rtol=1e-4
-    )
 
 
 def test_it_learns_to_prefer_the_expert_to_the_agent():
@@ -54,7 +51,7 @@ def test_it_learns_to_prefer_the_expert_to_the_agent():
     expert = show(reward, np.stack([squares(expert_motion(2))] * 2))
     random = show(reward, agents(runs, 99))
     measures = reward.end_iteration()
-    assert (expert.mean((1, 2)) > 2 * random.mean((1, 2))).all()
+    assert (expert.mean((1, 2)) > random.mean((1, 2)) + 1).all()
     assert (measures["expert_accuracy"] > 0.9).all()
     assert (measures["agent_accuracy"] > 0.6).all()  # random motion is at times where the expert is
 
@@ -67,7 +64,8 @@ def test_it_sees_when_a_frame_comes_too_late():
         show(reward, late)
         measures = reward.end_iteration()
     in_time = show(reward, squares(expert_motion(2))[None])
-    assert in_time.mean() > 3 * show(reward, late).mean()
+    assert in_time.mean() > 1
+    assert show(reward, late).mean() < -1
     assert measures["agent_accuracy"][0] > 0.9
 
 

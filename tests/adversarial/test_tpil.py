@@ -1,4 +1,4 @@
-"""TPIL: gradient reversal, the pair of frames, domain confusion, and random motion in the expert's views."""
+"""TPIL: gradient reversal, the pair of frames, domain confusion, and wrong pushes in the expert's views."""
 
 import numpy as np
 import torch
@@ -74,8 +74,8 @@ def test_a_step_is_judged_with_the_frame_three_steps_before():
     for t in range(1, LAST + 1):
         pair = [to_input(clip[0, :, max(t - 3, 1)]), to_input(clip[0, :, t])]
         features = torch.cat([network.features(frame) for frame in pair], dim=1)
-        expected = torch.sigmoid(network.class_head(features)).item()
-        np.testing.assert_allclose(earned[t - 1], expected, rtol=1e-5)
+        expected = network.class_head(features).item()
+        np.testing.assert_allclose(earned[t - 1], expected, rtol=1e-4, atol=1e-6)
 
 
 def test_it_prefers_the_experts_motion_in_a_view_where_it_never_saw_it():
@@ -88,7 +88,7 @@ def test_it_prefers_the_experts_motion_in_a_view_where_it_never_saw_it():
     assert measures["bystander_accuracy"][0] > 0.8
     expert = show(reward, squares(expert_motion(1), ground=60)[None]).mean()
     random = show(reward, squares(random_motion(20, 99), ground=60)[None]).mean()
-    assert expert > random + 0.2
+    assert expert > random + 0.5
 
 
 def test_bystanders_push_the_object_away_from_where_it_lies_and_from_where_the_expert_brings_it():

@@ -1,4 +1,7 @@
-"""GAIL on images (Ho and Ermon 2016): a discriminator of single frames and their time; reward -log(1 - D)."""
+"""GAIL on images (Ho and Ermon 2016): a discriminator D of single frames and their time.
+
+The reward is log D - log(1 - D), which has a slope on both sides, as Kostrikov et al. (2019) have it.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -48,10 +51,6 @@ class FrameDiscriminator(Discriminator):
         time = with_time_features(2 * views.time[:, None] - 1, _TIME_FEATURES)
         inputs = torch.cat([self.features(views.now), time], dim=1)
         return self.output(F.leaky_relu(self.hidden(inputs), _LEAK)).squeeze(1)
-
-    def reward(self, logits: Tensor) -> Tensor:
-        """-log(1 - D)."""
-        return F.softplus(logits)
 
     def loss(self, views: Mapping[str, Views]) -> Tensor:
         """-E_expert[log D] - E_agent[log(1 - D)]."""

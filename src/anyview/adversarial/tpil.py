@@ -75,10 +75,6 @@ class PairDiscriminator(Discriminator):
         """log P(expert)/P(not expert), (B,)."""
         return self._logits(self.features(views.before), self.features(views.now))
 
-    def reward(self, logits: Tensor) -> Tensor:
-        """P(expert)."""
-        return torch.sigmoid(logits)
-
     def loss(self, views: Mapping[str, Views]) -> Tensor:
         """Cross-entropy of both heads; in each, both labels weigh the same."""
         before = {name: self.features(batch.before) for name, batch in views.items()}

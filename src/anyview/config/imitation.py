@@ -65,8 +65,7 @@ class Discriminator(Block):
         description="newest episodes that it learns from, and that it then scores anew for the learner"
     )
     gradient_penalty: NonNegative = Field(
-        description="weight of half the squared gradients of its logits by the frames of expert and agent; "
-        "0 leaves it out"
+        description="weight of the mean squared gradient of its logits by the frames; 0 leaves it out"
     )
     domain_weight: NonNegative = Field(description="gradient reversal of TPIL's domain head")
 

@@ -52,11 +52,7 @@ class Discriminator(nn.Module):
     lag = 0
 
     def logits(self, views: Views) -> Tensor:
-        """log P(expert)/P(not expert), (B,)."""
-        raise NotImplementedError
-
-    def reward(self, logits: Tensor) -> Tensor:
-        """The reward of what is seen."""
+        """log P(expert)/P(not expert), (B,): the reward of what is seen."""
         raise NotImplementedError
 
     def loss(self, views: Mapping[str, Views]) -> Tensor:
@@ -77,16 +73,17 @@ def cross_entropy(logits: Tensor, label: float) -> Tensor:
     return F.binary_cross_entropy_with_logits(logits, torch.full_like(logits, label))
 
 
-def gradient_penalty(network: Discriminator, views: Views) -> Tensor:
-    """Half the mean of |d logits / d frames|^2 over a batch, a scalar (R1 and R2 of Mescheder et al. 2018).
+def gradient_penalty(network: Discriminator, batches: Sequence[Views]) -> Tensor:
+    """Mean of |d logits / d frames|^2 over ``batches``, a scalar.
 
+    For the expert's and the agent's it is the sum of R1 and R2 of Mescheder et al. (2018) for gamma 1.
     Without it logits jump wherever two frames differ, and the reward does not say by how much they do.
     """
-    before, now = (frames.clone().requires_grad_() for frames in (views.before, views.now))
-    logits = network.logits(Views(before, now, views.time))
+    before = torch.cat([views.before for views in batches]).requires_grad_()
+    now = torch.cat([views.now for views in batches]).requires_grad_()
+    logits = network.logits(Views(before, now, torch.cat([views.time for views in batches])))
     gradients = torch.autograd.grad(logits.sum(), [before, now], create_graph=True, materialize_grads=True)
-    squares = torch.stack([gradient.flatten(1).square().sum(1) for gradient in gradients])
-    return squares.sum(0).mean() / 2
+    return torch.stack([gradient.square().sum() for gradient in gradients]).sum() / len(now)
 
 
 class LearnedReward:
@@ -130,7 +127,7 @@ class LearnedReward:
         rewards = []
         for network, seen in zip(self.networks, self._seen, strict=True):
             now, before = to_input(seen[:, step]), to_input(seen[:, max(step - network.lag, 1)])
-            rewards.append(network.reward(network.logits(Views(before, now, time))))
+            rewards.append(network.logits(Views(before, now, time)))
         return torch.stack(rewards).numpy()
 
     def end_iteration(self) -> Arrays:
@@ -156,7 +153,7 @@ class LearnedReward:
             clips = ClipSet(episodes, np.arange(len(episodes)))
             for index in clips.rows:
                 views = clips.views(np.full(len(times), index), times, network.lag)
-                earned[index] = network.reward(network.logits(views)).numpy()
+                earned[index] = network.logits(views).numpy()
         return rewards
 
     def _learn(self, index: int) -> None:
@@ -171,10 +168,10 @@ class LearnedReward:
         self._optimizer.step()
 
     def _loss(self, network: Discriminator, views: Mapping[str, Views]) -> Tensor:
-        """The network's own loss and the penalty on the frames of expert and agent."""
+        """The network's own loss and the penalty on its gradients."""
         loss, weight = network.loss(views), self._params.gradient_penalty
         if weight:
-            loss = loss + weight * sum(gradient_penalty(network, views[name]) for name in ("expert", "agent"))
+            loss = loss + weight * gradient_penalty(network, list(views.values()))
         return loss
 
     def _draw(self, row: int, agent: np.ndarray, name: str, *indices: int) -> dict[str, Views]:
