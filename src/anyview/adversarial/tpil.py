@@ -51,7 +51,10 @@ class ReverseGradient(torch.autograd.Function):
 
 
 class PairDiscriminator(Discriminator):
-    """Two 3x3 convolutions of 5 channels, each with 2x2 pooling; heads with one connected layer of 128."""
+    """Two 3x3 convolutions of 5 channels, each with 2x2 pooling; heads with one connected layer of 128.
+
+    As in ``gail`` frames are seen at half their size, which is near the paper's 50 pixels.
+    """
 
     lag = 3
 
@@ -59,6 +62,7 @@ class PairDiscriminator(Discriminator):
         super().__init__()
         self._domain_weight = domain_weight
         self.features = nn.Sequential(
+            nn.AvgPool2d(2),
             nn.Conv2d(3, _CHANNELS, 3, padding=1),
             nn.MaxPool2d(2),
             nn.LeakyReLU(_LEAK),
@@ -67,7 +71,7 @@ class PairDiscriminator(Discriminator):
             nn.LeakyReLU(_LEAK),
             nn.Flatten(),
         )
-        size = _CHANNELS * (image_size // 4) ** 2
+        size = _CHANNELS * (image_size // 8) ** 2
         self.class_head = _head(2 * size)
         self.domain_head = _head(size)
 
