@@ -7,7 +7,13 @@ from anyview.adversarial.common.discriminators import ClipSet, LearnedReward
 
 SIZE, LAST = 16, 8
 PARAMS = config.Discriminator(
-    batch_size=16, learning_rate=0.003, steps=10, memory=4, gradient_penalty=0.0, domain_weight=0.2
+    batch_size=16,
+    learning_rate=0.003,
+    steps=10,
+    memory=6,
+    rescored=4,
+    gradient_penalty=0.0,
+    domain_weight=0.2,
 )
 
 

@@ -61,8 +61,9 @@ class Discriminator(Block):
     batch_size: Count
     learning_rate: Positive
     steps: Count = Field(description="steps of the discriminator after each iteration")
-    memory: Count = Field(
-        description="newest episodes that it learns from, and that it then scores anew for the learner"
+    memory: Count = Field(description="newest episodes of an agent that it learns from")
+    rescored: Count = Field(
+        description="newest of them that it then scores anew; a learner on old data uses no others"
     )
     gradient_penalty: NonNegative = Field(
         description="weight of the mean squared gradient of its logits by the frames; 0 leaves it out"

@@ -68,6 +68,11 @@ class Discriminator(nn.Module):
         }
 
 
+def _every(frames: np.ndarray) -> ClipSet:
+    """All clips of ``frames`` (N, T + 1, H, W, 3)."""
+    return ClipSet(frames, np.arange(len(frames)))
+
+
 def cross_entropy(logits: Tensor, label: float) -> Tensor:
     """Mean binary cross-entropy of ``logits`` (B,) that should all say ``label`` (0 or 1)."""
     return F.binary_cross_entropy_with_logits(logits, torch.full_like(logits, label))
@@ -90,8 +95,8 @@ class LearnedReward:
     """What R discriminators make of the agents' frames; see ``interfaces.RewardSource``.
 
     After an iteration each takes ``params.steps`` Adam steps on batches of the newest ``params.memory``
-    episodes of its agent, all of the iteration's at least, and of ``sets[r]``, run r's sets of others' clips
-    by name. These episodes are then rescored, so that all rewards that a learner hears of have one scale.
+    episodes of its agent and of ``sets[r]``, run r's sets of others' clips by name. The newest
+    ``params.rescored`` are then rescored, so that all rewards that a learner hears of have one scale.
     ``networks`` are the discriminators, one a run.
     """
 
@@ -114,7 +119,8 @@ class LearnedReward:
         self._shape = sets[0]["expert"].frames.shape[1:]
         self._iteration = 0
         self._seen = np.zeros((len(self._runs), 0, *self._shape), np.uint8)
-        self._memory = self._seen
+        self._memory = np.zeros((len(self._runs), params.memory, *self._shape), np.uint8)  # a ring
+        self._written = 0
 
     @torch.inference_mode()
     def step(self, frames: np.ndarray, step: int) -> np.ndarray:
@@ -134,11 +140,12 @@ class LearnedReward:
         """Learn from the newest episodes; accuracies (R,) on the iteration's frames before that."""
         with torch.inference_mode():
             measures = [
-                network.accuracies(self._draw(row, self._seen, "discriminator-measures", self._iteration))
-                for row, network in enumerate(self.networks)
+                network.accuracies(self._draw(row, _every(seen), "discriminator-measures", self._iteration))
+                for row, (network, seen) in enumerate(zip(self.networks, self._seen, strict=True))
             ]
-        kept = max(self._params.memory, self._seen.shape[1])
-        self._memory = np.concatenate([self._memory, self._seen], axis=1)[:, -kept:]
+        newest = self._seen[:, -self._params.memory :]
+        self._written += newest.shape[1]
+        self._memory[:, self._newest(newest.shape[1])] = newest
         self._iteration += 1
         for index in range(self._params.steps):
             self._learn(index)
@@ -146,21 +153,33 @@ class LearnedReward:
 
     @torch.inference_mode()
     def rescored(self) -> np.ndarray:
-        """Rewards (R, E, T) of the remembered episodes."""
-        times = np.arange(1, self._shape[0])
-        rewards = np.zeros((*self._memory.shape[:2], len(times)), np.float32)
+        """Rewards (R, E, T) of the newest episodes, the oldest of them first."""
+        times, rows = np.arange(1, self._shape[0]), self._newest(self._params.rescored)
+        rewards = np.zeros((len(self.networks), len(rows), len(times)), np.float32)
         for network, episodes, earned in zip(self.networks, self._memory, rewards, strict=True):
-            clips = ClipSet(episodes, np.arange(len(episodes)))
-            for index in clips.rows:
-                views = clips.views(np.full(len(times), index), times, network.lag)
+            clips = ClipSet(episodes, rows)
+            for index, row in enumerate(rows):
+                views = clips.views(np.full(len(times), row), times, network.lag)
                 earned[index] = network.logits(views).numpy()
         return rewards
+
+    def _newest(self, count: int) -> np.ndarray:
+        """Where the newest ``count`` episodes are in the memory, or all if it has fewer; the oldest first."""
+        capacity = self._memory.shape[1]
+        count = min(count, self._written, capacity)
+        return (self._written - count + np.arange(count)) % capacity
 
     def _learn(self, index: int) -> None:
         """One step of every discriminator: a sum of losses that share no weights."""
         batches = (
-            self._draw(row, self._memory, "discriminator-batch", self._iteration, index)
-            for row in range(len(self._runs))
+            self._draw(
+                row,
+                ClipSet(remembered, self._newest(self._written)),
+                "discriminator-batch",
+                self._iteration,
+                index,
+            )
+            for row, remembered in enumerate(self._memory)
         )
         losses = [self._loss(network, views) for network, views in zip(self.networks, batches, strict=True)]
         self._optimizer.zero_grad()
@@ -174,10 +193,10 @@ class LearnedReward:
             loss = loss + weight * gradient_penalty(network, list(views.values()))
         return loss
 
-    def _draw(self, row: int, agent: np.ndarray, name: str, *indices: int) -> dict[str, Views]:
-        """A batch of each of run ``row``'s sets and of its ``agent`` clips (R, E, T + 1, H, W, 3)."""
+    def _draw(self, row: int, agent: ClipSet, name: str, *indices: int) -> dict[str, Views]:
+        """A batch of each of run ``row``'s sets and of its ``agent`` clips."""
         rng = stream(self._seed, name, self._runs[row], *indices)
-        sets = {**self._sets[row], "agent": ClipSet(agent[row], np.arange(agent.shape[1]))}
+        sets = {**self._sets[row], "agent": agent}
         lag, count = self.networks[row].lag, self._params.batch_size
         return {name: clips.draw(rng, count, lag) for name, clips in sets.items()}
 
@@ -186,11 +205,13 @@ class LearnedReward:
         arrays = {f"network/{name}": value.numpy() for name, value in self._modules.state_dict().items()}
         for index, state in self._optimizer.state_dict()["state"].items():
             arrays |= {f"optimizer/{index}/{key}": value.numpy() for key, value in state.items()}
-        return arrays | {"memory": self._memory, "iteration": np.array([self._iteration])}
+        counts = np.array([self._iteration, self._written])
+        return arrays | {"memory": self._memory[:, : self._written], "counts": counts}
 
     def restore(self, state: Arrays) -> None:
         """Continue from ``state()`` bit for bit."""
-        self._memory, self._iteration = state["memory"], int(state["iteration"][0])
+        self._memory[:, : state["memory"].shape[1]] = state["memory"]
+        self._iteration, self._written = map(int, state["counts"])
         network: dict[str, Tensor] = {}
         moments: dict[int, dict[str, Tensor]] = {}
         for name, array in state.items():
