@@ -7,9 +7,8 @@ from scipy import stats
 
 from anyview import paths
 from anyview.analysis.estimates import Estimator
-from anyview.analysis.replicates import ablations, learning, rates, read_replicates
+from anyview.analysis.replicates import BUDGETS, ablations, claims, learning, rates, read_replicates, verdicts
 from anyview.analysis.statistics import holm
-from anyview.runtime.errors import AnyviewError
 
 SEEDS, CONTEXTS = 6, 15
 ESTIMATOR = Estimator(1)
@@ -120,7 +119,7 @@ def test_one_translator_is_drawn_every_time():
 
 
 def test_only_what_has_all_of_its_seeds_is_read(data, params):
-    evidence = params.evidence
+    evidence = params.evidence.losses
     for seed in evidence.seeds:
         data.policies(paths.replicate("sim", seed, "raw"), 0.03)
         data.policies(paths.replicate("sim-no-alignment", seed, "raw"), 0.3)
@@ -134,6 +133,20 @@ def test_only_what_has_all_of_its_seeds_is_read(data, params):
     assert (table.groupby("cell")["final_distance"].last().loc[["ours", "no-alignment"]] > 0.001).all()
 
 
-def test_nothing_to_read_is_said_so(params, tmp_path):
-    with pytest.raises(AnyviewError, match="no translator is evaluated with all of its seeds yet"):
-        read_replicates(params, tmp_path)
+def test_a_claim_is_judged_after_each_budget_by_the_curves():
+    """Without the loss policies are as good at first, and stay behind."""
+    cells = {"ours": lucky(0.01, 0.2), "no-translation": lucky(0.012, 0.2, 1)}
+    early = runs_of(cells | {"no-translation": lucky(0.01, 0.2)}).assign(iteration=10)
+    late = runs_of(cells | {"no-translation": lucky(0.1, 0.2, 1)}).assign(iteration=40)
+    table = claims(pd.concat([early, late]).drop(columns="success"), ESTIMATOR, 49)
+    assert list(table["steps"]) == [490, 1960]  # a quarter and a half are both the first point
+    assert len(BUDGETS) == 3
+    assert list(table["claim"]) == ["open", "supported"]
+    expected = ablations(late, ESTIMATOR)
+    assert table["p"].iloc[1] == expected["p"].iloc[0]
+    (row,) = verdicts(table).itertuples()
+    assert (row.cell, row.claims) == ("no-translation", ("open", "supported"))
+
+
+def test_where_nothing_was_run_there_are_no_runs(params, tmp_path):
+    assert all(table.empty for table in read_replicates(params, tmp_path))
