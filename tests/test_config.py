@@ -222,6 +222,7 @@ def test_the_committed_params_are_sound():
             ["sim", "real-pretrained"],
             "evidence: translators.real-pretrained.pretraining.iterations: no translator of the evidence ",
         ),
+        ("evidence.losses.others.seeds", [7], "evidence.losses: others.seeds: some of them are not in seeds"),
         ("evidence.diversity.views", [4, 1], "evidence.diversity.views: they must rise"),
         ("evidence.diversity.views", ["any", 4], "evidence.diversity.views: they must rise"),
         (

@@ -234,6 +234,10 @@ def test_the_study_knows_nothing_of_the_evidence_and_this_plans_every_seed():
         f"{name}-seed-{seed}-{reward}"
         for name, seed, reward in product(losses.translators, losses.seeds, losses.rewards)
     }
+    policies |= {
+        f"{name}-seed-{seed}-{reward}"
+        for name, seed, reward in product(losses.translators, losses.others.seeds, losses.others.rewards)
+    }
     sets = {f"views-{views}-{clutter}" for views, clutter in product(diversity.views, CLUTTER)}
     policies |= {
         f"{name}-{count}-seed-{seed}-{evaluation}"

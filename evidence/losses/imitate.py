@@ -18,14 +18,14 @@ def main(arguments: list[str]) -> None:
     losses = params.evidence.losses
     translator, seed, reward = choose_each(
         arguments,
-        {"TRANSLATOR": losses.translators, "SEED": losses.seeds, "REWARD": losses.rewards},
+        {"TRANSLATOR": losses.translators, "SEED": losses.seeds, "REWARD": losses.every_reward},
         "losses/imitate.py",
     )
     model, name = paths.replicate(translator, int(seed)), paths.replicate(translator, int(seed), reward)
     ours = params.imitation.cells.get("ours")
     if not isinstance(ours, DemonstrationCell) or (ours.learner, ours.reward) != ("ddpg", "translated"):
         raise AnyviewError("params.yaml: imitation.cells.ours: must be of ddpg and translated demonstrations")
-    cell = ours.model_copy(update={"model": model, "weights": losses.rewards[reward]})
+    cell = ours.model_copy(update={"model": model, "weights": losses.every_reward[reward]})
     imitation = params.imitation.model_copy(update={"cells": {name: cell}})
     method = Method(ddpg.make_learner, make_reward)
     evaluate_method(name, params.model_copy(update={"imitation": imitation}), method, [paths.model(model)])

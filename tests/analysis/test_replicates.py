@@ -89,7 +89,9 @@ def test_the_contrasts_of_both_rewards_are_corrected_together():
 
 def test_few_translators_carry_no_claim():
     runs = runs_of({"ours": lucky(0.01, 0.0, count=3), "no-alignment": lucky(0.5, 0.0, count=3)})
-    assert list(ablations(runs, ESTIMATOR)["claim"]) == ["few"]
+    (row,) = ablations(runs, ESTIMATOR).itertuples()
+    assert row.claim == "few"
+    assert np.isnan(row.p)  # so that it takes nothing from the others' tests
 
 
 def test_rates_count_over_translators_and_contexts():

@@ -31,11 +31,11 @@ def read_replicates(params: Params, root: Path = Path()) -> tuple[pd.DataFrame, 
     """
     losses = params.evidence.losses
     runs, curves = [], []
-    for reward in losses.rewards:
+    for reward in losses.every_reward:
         for translator in losses.translators:
             folders = {
                 seed: root / paths.policies(paths.replicate(translator, seed, reward))
-                for seed in losses.seeds
+                for seed in losses.seeds_under(reward)
             }
             for seed, folder in folders.items() if all(map(Path.exists, folders.values())) else ():
                 method, keys = (
@@ -65,7 +65,8 @@ def ablations(runs: pd.DataFrame, estimator: Estimator) -> pd.DataFrame:
 
     ``reward, cell, translators``, then as ``contrast`` has it; ``thesis``: its difference of success rates;
     ``p``: exact test that exchanges the two cells' translators, of their mean log distances, corrected for
-    all rows; ``claim``, that the loss helps: ``supported``, ``refuted`` (it harms), ``open`` or ``few``.
+    all rows but those of ``few`` translators, which have none; ``claim``, that the loss helps: ``supported``,
+    ``refuted`` (it harms), ``open`` or ``few``.
     """
     tables = {(reward, cell): values for reward, cell, *values in _tables(runs)}
     rows = []
@@ -84,7 +85,10 @@ def ablations(runs: pd.DataFrame, estimator: Estimator) -> pd.DataFrame:
             }
         )
     table = pd.DataFrame(rows, columns=["reward", "cell", "translators", *CONTRAST, "thesis", "p"])
-    table["p"] = holm(table["p"].to_numpy(float))
+    tested = (table["translators"] >= ENOUGH_TRANSLATORS).to_numpy()
+    p_values = np.full(len(table), np.nan)
+    p_values[tested] = holm(table["p"].to_numpy(float)[tested])
+    table["p"] = p_values
     return table.assign(claim=[_claim(row) for row in table.itertuples()])
 
 

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
 
 from anyview.config.imitation import RewardWeights
 from anyview.config.values import Block, Count, Name
@@ -25,6 +25,13 @@ def _rising(values: list) -> list:
 Seeds = Annotated[list[Annotated[int, Field(ge=0)]], Field(min_length=1), AfterValidator(_distinct)]
 
 
+class OtherRewards(Block):
+    """Rewards under which some of the translators alone are evaluated."""
+
+    seeds: Seeds = Field(description="of these translators: some of `evidence.losses.seeds`")
+    rewards: dict[Name, RewardWeights] = Field(min_length=1)
+
+
 class Losses(Block):
     """Part `losses` of the evidence: the translators of figure 20, each trained several times, for `ours`."""
 
@@ -34,6 +41,24 @@ class Losses(Block):
     seeds: Seeds = Field(description="of the trainings, one of each translator for each seed")
     iterations: Count = Field(description="of each training, instead of the cell's own")
     rewards: dict[Name, RewardWeights] = Field(min_length=1)
+    others: OtherRewards
+
+    @model_validator(mode="after")
+    def _others_of_these(self) -> "Losses":
+        if not set(self.others.seeds) <= set(self.seeds):
+            raise ValueError("others.seeds: some of them are not in seeds")
+        if twice := self.rewards.keys() & self.others.rewards.keys():
+            raise ValueError(f"others.rewards.{min(twice)}: the name is taken by rewards")
+        return self
+
+    @property
+    def every_reward(self) -> dict[str, RewardWeights]:
+        """Those for all of the translators, and the others."""
+        return {**self.rewards, **self.others.rewards}
+
+    def seeds_under(self, reward: str) -> list[int]:
+        """Of the translators that are evaluated under ``reward``."""
+        return self.seeds if reward in self.rewards else self.others.seeds
 
 
 class Diversity(Block):
