@@ -3,11 +3,9 @@
 Usage, in evidence/: python diversity/imitate.py VIEWS CLUTTER DEMONSTRATIONS SEED EVALUATION
 """
 
-from functools import partial
-
 from anyview import paths
 from anyview.config import DemonstrationCell, load_params
-from anyview.diversity.sets import restrict
+from anyview.diversity.sets import restriction
 from anyview.evaluation.methods import Method
 from anyview.evaluation.stage import evaluate_method
 from anyview.learners import ddpg
@@ -47,11 +45,9 @@ def main(arguments: list[str]) -> None:
             ),
         }
     )
-    own = partial(
-        restrict, views=None if views == paths.ANY_VIEW else int(views), distractors=clutter == "distractors"
-    )
     method = Method(ddpg.make_learner, make_reward)
-    evaluate_method(name, params, method, [paths.model(model)], own if evaluation == "own" else None)
+    change = restriction(views, clutter) if evaluation == "own" else None
+    evaluate_method(name, params, method, [paths.model(model)], change)
 
 
 if __name__ == "__main__":

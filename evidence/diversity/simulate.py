@@ -4,6 +4,7 @@ Usage, in evidence/: python diversity/simulate.py VIEWS CLUTTER
 """
 
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from anyview import paths
 from anyview.config import load_params
-from anyview.diversity.sets import restrict
+from anyview.diversity.sets import restriction
 from anyview.pusher.contexts import Context
 from anyview.pusher.expert import roll_out
 from anyview.pusher.render import renderer
@@ -27,7 +28,7 @@ from anyview.video.sets import StoredFile, write_set, write_shard
 
 
 def render_shard(
-    folder: Path, index: int, contexts: list[str], views: int | None, distractors: bool, image_size: int
+    folder: Path, index: int, contexts: list[str], restrict: Callable[[Context], Context], image_size: int
 ) -> dict[str, Any]:
     """Make shard ``index``: the demonstrations in ``contexts``, restricted; unless an earlier try did.
 
@@ -35,7 +36,7 @@ def render_shard(
     """
 
     def make() -> tuple[dict[str, Any], list[str]]:
-        shown = [restrict(Context.from_json(text), views, distractors) for text in contexts]
+        shown = [restrict(Context.from_json(text)) for text in contexts]
         camera = renderer(shown[0].task, image_size)
         clips = [camera.render_clip(*scene) for scene in zip(shown, roll_out(shown)[0], strict=True)]
         stored = write_shard(folder, index, np.stack(clips))
@@ -60,9 +61,8 @@ def main(arguments: list[str]) -> None:
     )
     folder = checkpoint_folder(["diversity-simulate", name, size], dataset_files(source))
 
-    restriction = (None if views == paths.ANY_VIEW else int(views), clutter == "distractors")
     tasks = [
-        (folder, index, list(rows["context"]), *restriction, size)
+        (folder, index, list(rows["context"]), restriction(views, clutter), size)
         for index, (_, rows) in enumerate(manifest.groupby("shard", sort=False))
     ]
     records = []

@@ -13,8 +13,8 @@ import pandas as pd
 from anyview import paths
 from anyview.analysis.comparisons import ENOUGH_RUNS, SIGNIFICANT, log_distance
 from anyview.analysis.estimates import Estimator
-from anyview.analysis.replicates import CONTRAST, by_context, contrast, rate, stacked
-from anyview.analysis.statistics import holm, sign_flip_test
+from anyview.analysis.replicates import CONTRAST, by_context, contrast, corrected, rate, stacked
+from anyview.analysis.statistics import sign_flip_test
 from anyview.analysis.study import read_method
 from anyview.config import Params
 from anyview.runtime.errors import AnyviewError
@@ -87,10 +87,10 @@ def levels(params: Params) -> dict[str, list[str]]:
 def effects(runs: pd.DataFrame, levels: dict[str, list[str]], estimator: Estimator) -> pd.DataFrame:
     """What the next of the ``levels`` of a factor changes, over all cells that differ in this factor alone.
 
-    ``evaluation, factor, before, after``;
-    ``pairs`` of translators; as ``replicates.contrast`` has it, of the level after; ``p``: sign-flip test of
-    the pairs' mean log ratios, corrected for all rows; ``claim``: more diversity ``helps``, ``harms``, or it
-    is ``open``; ``few``: fewer than ``ENOUGH_RUNS`` pairs.
+    ``evaluation, factor, before, after``; ``pairs`` of translators; as ``replicates.contrast`` has it, of the
+    level after; ``p``: sign-flip test of the pairs' mean log ratios, corrected for all rows but those of
+    ``few`` pairs, which have none; ``claim``: more diversity ``helps``, ``harms``, or it is ``open``;
+    ``few``: fewer than ``ENOUGH_RUNS`` pairs.
     """
     rows = []
     for evaluation, table in runs.groupby("evaluation", sort=False):
@@ -107,7 +107,7 @@ def effects(runs: pd.DataFrame, levels: dict[str, list[str]], estimator: Estimat
                 }
             )
     table = pd.DataFrame(rows, columns=["evaluation", "factor", "before", "after", "pairs", *CONTRAST, "p"])
-    table["p"] = holm(table["p"].to_numpy(float))
+    table["p"] = corrected(table["p"], table["pairs"] >= ENOUGH_RUNS)
     return table.assign(
         claim=[
             "few"

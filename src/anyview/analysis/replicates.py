@@ -85,10 +85,7 @@ def ablations(runs: pd.DataFrame, estimator: Estimator) -> pd.DataFrame:
             }
         )
     table = pd.DataFrame(rows, columns=["reward", "cell", "translators", *CONTRAST, "thesis", "p"])
-    tested = (table["translators"] >= ENOUGH_TRANSLATORS).to_numpy()
-    p_values = np.full(len(table), np.nan)
-    p_values[tested] = holm(table["p"].to_numpy(float)[tested])
-    table["p"] = p_values
+    table["p"] = corrected(table["p"], table["translators"] >= ENOUGH_TRANSLATORS)
     return table.assign(claim=[_claim(row) for row in table.itertuples()])
 
 
@@ -161,6 +158,14 @@ def contrast(name: str, success: np.ndarray, logs: np.ndarray, estimator: Estima
     ratio = estimator.crossed_mean(f"{name}/ratio", logs).exponential()
     values = (found.value, found.low, found.high, ratio.value, ratio.low, ratio.high)
     return dict(zip(CONTRAST, values, strict=True))
+
+
+def corrected(p_values: pd.Series, enough: pd.Series) -> np.ndarray:
+    """Holm's correction of the ``p_values`` of which there are ``enough``; the others are not tested: NaN."""
+    found, tested = p_values.to_numpy(float, copy=True), enough.to_numpy(bool)
+    found[~tested] = np.nan
+    found[tested] = holm(found[tested])
+    return found
 
 
 def stacked(tables: Sequence[pd.DataFrame]) -> pd.DataFrame:

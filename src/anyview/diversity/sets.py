@@ -1,9 +1,12 @@
 """Sets that show the demonstrations of another from fewer sides, without distractors, or fewer of them."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
+from anyview import paths
 from anyview.pusher.contexts import Context
 from anyview.pusher.kinematics import wrap
 from anyview.pusher.proposals import DECIMALS
@@ -21,6 +24,12 @@ def restrict(context: Context, views: int | None, distractors: bool) -> Context:
         apart = 2 * np.pi / views
         azimuth = float(wrap(np.asarray(round(azimuth / apart) % views * apart)).round(DECIMALS))
     return replace(context, azimuth=azimuth, distractors=context.distractors if distractors else ())
+
+
+def restriction(views: str, clutter: str) -> Callable[[Context], Context]:
+    """``restrict`` as the name of a set says it: see ``paths.restricted_set``."""
+    count = None if views == paths.ANY_VIEW else int(views)
+    return partial(restrict, views=count, distractors=clutter == "distractors")
 
 
 def first_demonstrations(dataset: Dataset, count: int) -> Dataset:
