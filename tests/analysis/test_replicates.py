@@ -126,10 +126,15 @@ def test_only_what_has_all_of_its_seeds_is_read(data, params):
         data.policies(paths.replicate("sim", seed, "raw"), 0.03)
         data.policies(paths.replicate("sim-no-alignment", seed, "raw"), 0.3)
     data.policies(paths.replicate("sim", 1, "normalised"), 0.03)
+    for seed in evidence.others.seeds:
+        data.policies(paths.replicate("sim", seed, "raw-tenth"), 0.03)
     runs, curves = read_replicates(params, data.root)
-    assert set(zip(runs["reward"], runs["cell"], strict=True)) == {("raw", "ours"), ("raw", "no-alignment")}
-    assert sorted(runs["seed"].unique()) == evidence.seeds
-    assert len(runs) == 2 * len(evidence.seeds) * 15
+    assert runs.groupby(["reward", "cell"])["seed"].unique().map(list).to_dict() == {
+        ("raw", "ours"): evidence.seeds,
+        ("raw", "no-alignment"): evidence.seeds,
+        ("raw-tenth", "ours"): evidence.others.seeds,
+    }
+    assert len(runs) == 15 * (2 * len(evidence.seeds) + len(evidence.others.seeds))
     table = learning(curves, 49)
     assert set(table["steps"]) == {49 * iteration for iteration in curves["iteration"]}
     assert (table.groupby("cell")["final_distance"].last().loc[["ours", "no-alignment"]] > 0.001).all()
