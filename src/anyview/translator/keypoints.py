@@ -26,7 +26,8 @@ _CHANNELS = 16, 32, 64  # of the maps at a half, a quarter and an eighth of the 
 _HIDDEN = 256
 _STRIDE = 8
 _OUTSIDE = 1.1  # where what is outside of the picture counts as being
-_COPIED = 2.0  # subtracted from the mask, so that at first most is copied
+_COPIED = 4.0  # added to the mask of what stands still, so that at first most is copied
+_SHORT = 0.05  # a line shorter than that has no direction
 _SIGMA = 1.0  # of a Gaussian, in pixels of the finest map
 
 
@@ -116,6 +117,8 @@ class DrawingTerms(NamedTuple):
     """The context's part of the finest map, (C, 32, H/2, W/2)."""
     tints: Tensor
     """What a keypoint or a line adds to that map where it is drawn, (C, 32, 2 K - 1)."""
+    places: Tensor
+    """The keypoints of the first frames, (C, K, 2)."""
 
 
 class KeypointDecoder(nn.Module):
@@ -135,7 +138,8 @@ class KeypointDecoder(nn.Module):
         self.up = nn.ModuleList([_doubling(coarse, middle), _doubling(middle, middle)])
         self.smooth = nn.ModuleList([_layer(middle, middle, 3), _layer(middle, middle, 3)])
         self.last_up = _doubling(middle, fine)
-        self.output = nn.Conv2d(fine + 3, 4, 3, padding=1)
+        carried = 2 * KEYPOINTS  # pictures: one for each keypoint and line, and the first frame itself
+        self.output = nn.Conv2d(fine + 3 * carried, 3 + carried + 1, 3, padding=1)
 
     def skip_terms(self, skips: list[Tensor]) -> DrawingTerms:
         """What ``forward`` needs of what ``KeypointTranslator.encode_context`` returns beside z2."""
@@ -144,11 +148,12 @@ class KeypointDecoder(nn.Module):
         known = torch.cat((known, torch.ones_like(known[..., :1])), -1)
         drawn, erased = (torch.einsum("nka,kac->nck", known, w) for w in (self.drawn, self.erased))
         still = self.still(finest)
-        return DrawingTerms(first, still + _paint(erased, _strokes(_places(code), still)), drawn)
+        places = _places(code)
+        return DrawingTerms(first, still + _paint(erased, _strokes(places, still)), drawn, places)
 
     def forward(self, z: Tensor, terms: DrawingTerms, noise: Generator | None = None) -> Tensor:
         """``z`` (N, ...) in the ``terms`` of C contexts, row n modulo C; ``noise`` is not needed."""
-        first, still, tints = (
+        first, still, tints, before = (
             each if len(each) == len(z) else each.repeat(len(z) // len(each), *[1] * (each.ndim - 1))
             for each in terms
         )
@@ -158,8 +163,11 @@ class KeypointDecoder(nn.Module):
         x = self.deep(x + self.vector(z[:, 2 * KEYPOINTS :])[:, :, None, None])
         for skip, up, smooth in zip((middle, finest), self.up, self.smooth, strict=True):
             x = smooth(activate(up(x) + skip))
-        x = self.output(torch.cat((activate(self.last_up(x)), first), 1))
-        return torch.lerp(first, x[:, :3], torch.sigmoid(x[:, 3:] - _COPIED))
+        carried = torch.cat((first[:, None], _carry(first, before, _places(z))), 1)
+        x = self.output(torch.cat((activate(self.last_up(x)), carried.flatten(1, 2).to(x.dtype)), 1))
+        drawn, logits = x[:, :3].float(), x[:, 3:].float()
+        logits = torch.cat((logits[:, :1] + _COPIED, logits[:, 1:]), 1)
+        return (torch.cat((carried, drawn[:, None]), 1) * logits.softmax(1)[:, :, None]).sum(1)
 
 
 class KeypointTranslator(nn.Module):
@@ -268,6 +276,29 @@ def _squares(places: Tensor, grid: Tensor) -> Tensor:
     length = ways.square().sum(-1, keepdim=True)
     t = (along / length.clamp(min=1e-6)).clamp(0, 1)
     return torch.cat((squares, squares[:, :-1] - t * (2 * along - t * length)), 1)
+
+
+def _carry(first: Tensor, before: Tensor, now: Tensor) -> Tensor:
+    """First frames (N, 3, H, W) carried along by keypoints ``before`` to ``now`` (N, K, 2): (N, 2 K - 1, 3, H, W).
+
+    Each keypoint shifts the picture; each line shifts it with its first end, and turns it as it turns.
+    """
+    count, strokes = len(first), 2 * KEYPOINTS - 1
+    before, now = before.float(), now.float()
+    axis = _axis(first)
+    grid = torch.stack(torch.meshgrid(axis, axis, indexing="xy"), -1).flatten(0, 1)  # (H W, 2)
+    anchors, sources = (torch.cat((places, places[:, :-1]), 1)[:, :, None] for places in (now, before))
+    away = grid - anchors  # (N, S, H W, 2)
+    old, new = (F.normalize(places[:, 1:] - places[:, :-1], dim=-1, eps=_SHORT) for places in (before, now))
+    cosine = (old * new).sum(-1)
+    sine = old[..., 1] * new[..., 0] - old[..., 0] * new[..., 1]
+    still = torch.ones_like(now[..., 0])
+    c, s = (torch.cat(x, 1)[:, :, None] for x in ((still, cosine), (0 * still, sine)))
+    x, y = away.unbind(-1)
+    turned = torch.stack((c * x - s * y, s * x + c * y), -1) + sources
+    shape = count, strokes * first.shape[2], first.shape[3]
+    seen = F.grid_sample(first.float(), turned.reshape(*shape, 2), padding_mode="border", align_corners=False)
+    return seen.unflatten(2, (strokes, first.shape[2])).transpose(1, 2)
 
 
 def _paint(tints: Tensor, strokes: Tensor) -> Tensor:
