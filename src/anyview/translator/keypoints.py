@@ -20,6 +20,7 @@ from anyview.runtime.errors import AnyviewError
 from anyview.translator.network import activate
 
 KEYPOINTS = 8
+_STROKES = 2 * KEYPOINTS - 1  # the keypoints, and the lines from each to the next
 _VECTOR = 32  # entries of a code beside the places, for what these do not say
 _LOOK = 8  # entries that describe what is seen at a keypoint
 _CHANNELS = 16, 32, 64  # of the maps at a half, a quarter and an eighth of the frame's side
@@ -27,6 +28,8 @@ _HIDDEN = 256
 _STRIDE = 8
 _OUTSIDE = 1.1  # where what is outside of the picture counts as being
 _COPIED = 4.0  # added to the mask of what stands still, so that at first most is copied
+_CARRYING_POINTS = [0]  # keypoints that carry the picture along, and lines that do: marks.py's object, and
+_CARRYING_LINES = [2, 3]  # from tool to wrist to elbow
 _SHORT = 0.05  # a line shorter than that has no direction
 _SIGMA = 1.0  # of a Gaussian, in pixels of the finest map
 
@@ -35,11 +38,10 @@ class Seen(NamedTuple):
     """What the encoder makes of frames (N, 3, H, W)."""
 
     code: Tensor
-    """(N, 2 K + V): x and y of each keypoint, -1 to 1 from edge to edge, then a vector."""
+    """(N, 2 K + V + 8 S): x and y of each keypoint, -1 to 1 from edge to edge; a vector; the look of each
+    stroke, which is a keypoint or a line from one to the next."""
     map: Tensor
     """(N, 16, H/2, W/2)."""
-    looks: Tensor
-    """(N, K, 8), of what is at the keypoints."""
 
 
 class KeypointEncoder(nn.Module):
@@ -71,8 +73,9 @@ class KeypointEncoder(nn.Module):
         where = heat.unflatten(2, x.shape[2:])
         axis = _axis(x)
         places = torch.stack(((where.sum(2) * axis).sum(-1), (where.sum(3) * axis).sum(-1)), -1)
-        looks = heat @ self.look(x).flatten(2).transpose(1, 2)
-        return Seen(torch.cat((places.flatten(1), self.vector(pooled)), 1), x, looks)
+        strokes = _strokes(places.detach(), x).flatten(2)
+        looks = F.normalize(strokes, p=1, dim=-1, eps=1.0) @ self.look(x).flatten(2).transpose(1, 2)
+        return Seen(torch.cat((places.flatten(1), self.vector(pooled), looks.flatten(1)), 1), x)
 
     def _shrink(self, x: Tensor) -> list[Tensor]:
         maps = []
@@ -104,8 +107,8 @@ class KeypointTranslation(nn.Module):
         for layer in self.hidden:
             x = activate(layer(x))
         mixed = self.weights(x).unflatten(1, (KEYPOINTS, KEYPOINTS)) @ _places(z2)
-        vector = z2[:, 2 * KEYPOINTS :]
-        return z2 + self.steps(x) + torch.cat((mixed.flatten(1), torch.zeros_like(vector)), 1)
+        places, rest = z2[:, : 2 * KEYPOINTS], z1[:, 2 * KEYPOINTS :]
+        return self.steps(x) + torch.cat((places + mixed.flatten(1), rest), 1)
 
 
 class DrawingTerms(NamedTuple):
@@ -116,7 +119,7 @@ class DrawingTerms(NamedTuple):
     still: Tensor
     """The context's part of the finest map, (C, 32, H/2, W/2)."""
     tints: Tensor
-    """What a keypoint or a line adds to that map where it is drawn, (C, 32, 2 K - 1)."""
+    """What a stroke adds to that map where it is drawn, by its look in the first frame, (C, 32, S)."""
     places: Tensor
     """The keypoints of the first frames, (C, K, 2)."""
 
@@ -128,9 +131,10 @@ class KeypointDecoder(nn.Module):
         super().__init__()
         fine, middle, coarse = _CHANNELS
         self.still = nn.Conv2d(fine, middle, 1)
-        self.drawn = nn.Parameter(torch.empty(2 * KEYPOINTS - 1, _LOOK + 1, middle))
-        self.erased = nn.Parameter(torch.empty(2 * KEYPOINTS - 1, _LOOK + 1, middle))
-        for weights in (self.drawn, self.erased):
+        self.drawn = nn.Parameter(torch.empty(_STROKES, _LOOK + 1, middle))
+        self.erased = nn.Parameter(torch.empty(_STROKES, _LOOK + 1, middle))
+        self.now = nn.Parameter(torch.empty(_STROKES, _LOOK, middle))
+        for weights in (self.drawn, self.erased, self.now):
             nn.init.normal_(weights, std=(_LOOK + 1) ** -0.5)
         self.down = nn.ModuleList([_layer(middle, middle, 3, 2), _layer(middle, coarse, 3, 2)])
         self.vector = nn.Linear(_VECTOR, coarse)
@@ -138,14 +142,14 @@ class KeypointDecoder(nn.Module):
         self.up = nn.ModuleList([_doubling(coarse, middle), _doubling(middle, middle)])
         self.smooth = nn.ModuleList([_layer(middle, middle, 3), _layer(middle, middle, 3)])
         self.last_up = _doubling(middle, fine)
-        carried = 2 * KEYPOINTS  # pictures: one for each keypoint and line, and the first frame itself
+        carried = 1 + len(_CARRYING_POINTS) + len(_CARRYING_LINES)  # the first frame, still and carried
         self.output = nn.Conv2d(fine + 3 * carried, 3 + carried + 1, 3, padding=1)
 
     def skip_terms(self, skips: list[Tensor]) -> DrawingTerms:
         """What ``forward`` needs of what ``KeypointTranslator.encode_context`` returns beside z2."""
-        first, code, finest, looks = skips
-        known = torch.cat((looks, 0.5 * (looks[:, 1:] + looks[:, :-1])), 1)  # of keypoints, then of lines
-        known = torch.cat((known, torch.ones_like(known[..., :1])), -1)
+        first, code, finest = skips
+        looks = _looks(code)
+        known = torch.cat((looks, torch.ones_like(looks[..., :1])), -1)
         drawn, erased = (torch.einsum("nka,kac->nck", known, w) for w in (self.drawn, self.erased))
         still = self.still(finest)
         places = _places(code)
@@ -157,10 +161,11 @@ class KeypointDecoder(nn.Module):
             each if len(each) == len(z) else each.repeat(len(z) // len(each), *[1] * (each.ndim - 1))
             for each in terms
         )
+        tints = tints + torch.einsum("nka,kac->nck", _looks(z), self.now)
         finest = activate(still + _paint(tints, _strokes(_places(z), still)))
         middle = self.down[0](finest)
         x = self.down[1](middle)
-        x = self.deep(x + self.vector(z[:, 2 * KEYPOINTS :])[:, :, None, None])
+        x = self.deep(x + self.vector(_vector(z))[:, :, None, None])
         for skip, up, smooth in zip((middle, finest), self.up, self.smooth, strict=True):
             x = smooth(activate(up(x) + skip))
         carried = torch.cat((first[:, None], _carry(first, before, _places(z))), 1)
@@ -177,7 +182,7 @@ class KeypointTranslator(nn.Module):
     """
 
     architecture = "keypoint"
-    width = 2 * KEYPOINTS + _VECTOR
+    width = 2 * KEYPOINTS + _VECTOR + _STROKES * _LOOK
     shared = True
     task_embedding = True
 
@@ -198,8 +203,8 @@ class KeypointTranslator(nn.Module):
 
     def encode_context(self, frames: Tensor, noise: Generator | None = None) -> tuple[Tensor, list[Tensor]]:
         """z2 (N, width) of first frames (N, 3, H, W), and what the decoder needs beside codes."""
-        code, finest, looks = self.encoder(frames)
-        return code, [frames, code, finest, looks]
+        code, finest = self.encoder(frames)
+        return code, [frames, code, finest]
 
     def task_frames(self, length: int) -> np.ndarray:
         """Steps of a clip of ``length`` frames whose code T is given beside the present one: the first."""
@@ -249,6 +254,16 @@ def _places(code: Tensor) -> Tensor:
     return code[:, : 2 * KEYPOINTS].unflatten(1, (KEYPOINTS, 2))
 
 
+def _vector(code: Tensor) -> Tensor:
+    """(N, V) of codes (N, 2 K + V + 8 S)."""
+    return code[:, 2 * KEYPOINTS : 2 * KEYPOINTS + _VECTOR]
+
+
+def _looks(code: Tensor) -> Tensor:
+    """(N, S, 8) of codes (N, 2 K + V + 8 S)."""
+    return code[:, 2 * KEYPOINTS + _VECTOR :].unflatten(1, (_STROKES, _LOOK))
+
+
 def _axis(like: Tensor) -> Tensor:
     """The centres of the columns, or of the rows, of square maps ``like``, -1 to 1 from edge to edge."""
     side = like.shape[-1]
@@ -279,26 +294,26 @@ def _squares(places: Tensor, grid: Tensor) -> Tensor:
 
 
 def _carry(first: Tensor, before: Tensor, now: Tensor) -> Tensor:
-    """First frames (N, 3, H, W) carried along by keypoints ``before`` to ``now`` (N, K, 2): (N, 2 K - 1, 3, H, W).
+    """First frames (N, 3, H, W) carried by keypoints from ``before`` to ``now`` (N, K, 2): (N, B, 3, H, W).
 
-    Each keypoint shifts the picture; each line shifts it with its first end, and turns it as it turns.
+    A keypoint shifts the picture; a line shifts it with its first end, and turns it as it turns itself.
     """
-    count, strokes = len(first), 2 * KEYPOINTS - 1
     before, now = before.float(), now.float()
+    ends = _CARRYING_POINTS + _CARRYING_LINES
     axis = _axis(first)
-    grid = torch.stack(torch.meshgrid(axis, axis, indexing="xy"), -1).flatten(0, 1)  # (H W, 2)
-    anchors, sources = (torch.cat((places, places[:, :-1]), 1)[:, :, None] for places in (now, before))
-    away = grid - anchors  # (N, S, H W, 2)
-    old, new = (F.normalize(places[:, 1:] - places[:, :-1], dim=-1, eps=_SHORT) for places in (before, now))
-    cosine = (old * new).sum(-1)
-    sine = old[..., 1] * new[..., 0] - old[..., 0] * new[..., 1]
-    still = torch.ones_like(now[..., 0])
-    c, s = (torch.cat(x, 1)[:, :, None] for x in ((still, cosine), (0 * still, sine)))
-    x, y = away.unbind(-1)
-    turned = torch.stack((c * x - s * y, s * x + c * y), -1) + sources
-    shape = count, strokes * first.shape[2], first.shape[3]
-    seen = F.grid_sample(first.float(), turned.reshape(*shape, 2), padding_mode="border", align_corners=False)
-    return seen.unflatten(2, (strokes, first.shape[2])).transpose(1, 2)
+    x, y = torch.meshgrid(axis, axis, indexing="xy")
+    dx, dy = x - now[:, ends, 0, None, None], y - now[:, ends, 1, None, None]  # (N, B, H, W)
+    old, new = (
+        F.normalize(places[:, 1:] - places[:, :-1], dim=-1, eps=_SHORT)[:, _CARRYING_LINES]
+        for places in (before, now)
+    )
+    upright = torch.ones_like(before[:, _CARRYING_POINTS, 0])
+    cosine = torch.cat((upright, (old * new).sum(-1)), 1)[..., None, None]
+    sine = torch.cat((0 * upright, old[..., 1] * new[..., 0] - old[..., 0] * new[..., 1]), 1)[..., None, None]
+    turned = torch.stack((cosine * dx - sine * dy, sine * dx + cosine * dy), -1)
+    sources = turned + before[:, ends, None, None]
+    seen = F.grid_sample(first.float(), sources.flatten(1, 2), padding_mode="border", align_corners=False)
+    return seen.unflatten(2, (len(ends), first.shape[2])).transpose(1, 2)
 
 
 def _paint(tints: Tensor, strokes: Tensor) -> Tensor:
