@@ -27,7 +27,7 @@ _CHANNELS = 16, 32, 64  # of the maps at a half, a quarter and an eighth of the 
 _HIDDEN = 256
 _STRIDE = 8
 _OUTSIDE = 1.1  # where what is outside of the picture counts as being
-_COPIED = 4.0  # added to the mask of what stands still, so that at first most is copied
+_COPIED = 5.0  # added to the mask of what stands still, so that at first most is copied
 _CARRYING_POINTS = [0]  # keypoints that carry the picture along, and lines that do: marks.py's object, and
 _CARRYING_LINES = [2, 3]  # from tool to wrist to elbow
 _SHORT = 0.05  # a line shorter than that has no direction
@@ -59,7 +59,7 @@ class KeypointEncoder(nn.Module):
         self.up = nn.ModuleList([nn.Conv2d(coarse, middle, 1), nn.Conv2d(middle, fine, 1)])
         self.smooth = nn.ModuleList([_layer(middle, middle, 3), _layer(fine, fine, 3)])
         self.heat = nn.Conv2d(fine, KEYPOINTS, 1)
-        self.look = nn.Conv2d(fine, _LOOK, 1)
+        self.look = nn.Conv2d(fine, _LOOK - 3, 1)
         self.vector = nn.Linear(coarse, _VECTOR)
 
     def forward(self, frames: Tensor) -> Seen:
@@ -74,7 +74,8 @@ class KeypointEncoder(nn.Module):
         axis = _axis(x)
         places = torch.stack(((where.sum(2) * axis).sum(-1), (where.sum(3) * axis).sum(-1)), -1)
         strokes = _strokes(places.detach(), x).flatten(2)
-        looks = F.normalize(strokes, p=1, dim=-1, eps=1.0) @ self.look(x).flatten(2).transpose(1, 2)
+        seen = torch.cat((F.avg_pool2d(frames, 2), self.look(x)), 1)
+        looks = F.normalize(strokes, p=1, dim=-1, eps=1.0) @ seen.flatten(2).transpose(1, 2).float()
         return Seen(torch.cat((places.flatten(1), self.vector(pooled), looks.flatten(1)), 1), x)
 
     def _shrink(self, x: Tensor) -> list[Tensor]:
@@ -143,7 +144,7 @@ class KeypointDecoder(nn.Module):
         self.smooth = nn.ModuleList([_layer(middle, middle, 3), _layer(middle, middle, 3)])
         self.last_up = _doubling(middle, fine)
         carried = 1 + len(_CARRYING_POINTS) + len(_CARRYING_LINES)  # the first frame, still and carried
-        self.output = nn.Conv2d(fine + 3 * carried, 3 + carried + 1, 3, padding=1)
+        self.output = nn.Conv2d(fine + 3 * carried, 3 + carried + 1 + _STROKES, 3, padding=1)
 
     def skip_terms(self, skips: list[Tensor]) -> DrawingTerms:
         """What ``forward`` needs of what ``KeypointTranslator.encode_context`` returns beside z2."""
@@ -172,7 +173,11 @@ class KeypointDecoder(nn.Module):
         x = self.output(torch.cat((activate(self.last_up(x)), carried.flatten(1, 2).to(x.dtype)), 1))
         drawn, logits = x[:, :3].float(), x[:, 3:].float()
         logits = torch.cat((logits[:, :1] + _COPIED, logits[:, 1:]), 1)
-        return (torch.cat((carried, drawn[:, None]), 1) * logits.softmax(1)[:, :, None]).sum(1)
+        masks = logits.softmax(1)
+        flat = _looks(z)[..., :3].float().transpose(1, 2) @ masks[:, -_STROKES:].flatten(2)
+        masks = masks[:, :-_STROKES, None]
+        layers = torch.cat((carried, drawn[:, None]), 1)
+        return (layers * masks).sum(1) + flat.unflatten(2, first.shape[2:])
 
 
 class KeypointTranslator(nn.Module):
