@@ -1,10 +1,12 @@
 """A translator whose code is a list of places: where things are, not what the whole picture is like.
 
-Enc finds keypoints: the mean places under softmaxes over maps (Finn et al. 2016), with what the thing there
-looks like. T tells from the expert's keypoints, now and in the first frame, where those of the target's first
-frame go. Dec draws that: it carries each keypoint's look to its new place as a Gaussian (Jakab et al. 2018,
-Kulkarni et al. 2019), with lines from each to the next along which limbs and tools are drawn, and blends all
-this into the target's first frame by a mask (Ebert et al. 2017), so that whatever stands still is copied.
+Enc finds keypoints: the mean places under softmaxes over maps (Finn et al. 2016), with what is seen there and
+along the lines from each to the next. T tells from the expert's keypoints, now and in the first frame, where
+those of the target's first frame go, and takes from the expert what an arm looks like. Dec draws that in
+layers that masks blend (Ebert et al. 2017): the target's first frame, so that whatever stands still is
+copied; the same carried along by the object, the tool and the forearm (Siarohin et al. 2019), so that these
+stay as sharp as they were; the colour of each keypoint and line; for the rest what a network draws from
+Gaussians at the keypoints (Jakab et al. 2018, Kulkarni et al. 2019) and along the lines.
 
 Same methods as those of ``network.ContextTranslator``, with one encoder for the expert and for the context.
 """
@@ -22,14 +24,14 @@ from anyview.translator.network import activate
 KEYPOINTS = 8
 _STROKES = 2 * KEYPOINTS - 1  # the keypoints, and the lines from each to the next
 _VECTOR = 32  # entries of a code beside the places, for what these do not say
-_LOOK = 8  # entries that describe what is seen at a keypoint
+_LOOK = 8  # entries that describe what is seen at a stroke, of which the first three are its colour
 _CHANNELS = 16, 32, 64  # of the maps at a half, a quarter and an eighth of the frame's side
 _HIDDEN = 256
 _STRIDE = 8
 _OUTSIDE = 1.1  # where what is outside of the picture counts as being
 _COPIED = 5.0  # added to the mask of what stands still, so that at first most is copied
-_CARRYING_POINTS = [0]  # keypoints that carry the picture along, and lines that do: marks.py's object, and
-_CARRYING_LINES = [2, 3]  # from tool to wrist to elbow
+_SHIFTING = [0]  # keypoints that carry the first frame along: the object, see video/marks.py
+_TURNING = [2, 3]  # those from which lines do: from the tool to the wrist, and on to the elbow
 _SHORT = 0.05  # a line shorter than that has no direction
 _SIGMA = 1.0  # of a Gaussian, in pixels of the finest map
 
@@ -38,8 +40,8 @@ class Seen(NamedTuple):
     """What the encoder makes of frames (N, 3, H, W)."""
 
     code: Tensor
-    """(N, 2 K + V + 8 S): x and y of each keypoint, -1 to 1 from edge to edge; a vector; the look of each
-    stroke, which is a keypoint or a line from one to the next."""
+    """(N, 2 K + V + 8 S): x and y of the keypoints, -1 to 1 from edge to edge; a vector; the looks of the
+    strokes, which are the keypoints and the lines from each to the next."""
     map: Tensor
     """(N, 16, H/2, W/2)."""
 
@@ -126,7 +128,7 @@ class DrawingTerms(NamedTuple):
 
 
 class KeypointDecoder(nn.Module):
-    """Draws the keypoints of codes z (N, 2 K + V) into the contexts' first frames: (N, 3, H, W)."""
+    """Draws the keypoints of codes z (N, 2 K + V + 8 S) into the contexts' first frames: (N, 3, H, W)."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -143,8 +145,8 @@ class KeypointDecoder(nn.Module):
         self.up = nn.ModuleList([_doubling(coarse, middle), _doubling(middle, middle)])
         self.smooth = nn.ModuleList([_layer(middle, middle, 3), _layer(middle, middle, 3)])
         self.last_up = _doubling(middle, fine)
-        carried = 1 + len(_CARRYING_POINTS) + len(_CARRYING_LINES)  # the first frame, still and carried
-        self.output = nn.Conv2d(fine + 3 * carried, 3 + carried + 1 + _STROKES, 3, padding=1)
+        copies = 1 + len(_SHIFTING) + len(_TURNING)  # of the first frame: where it was, and carried along
+        self.output = nn.Conv2d(fine + 3 * copies, 3 + copies + 1 + _STROKES, 3, padding=1)
 
     def skip_terms(self, skips: list[Tensor]) -> DrawingTerms:
         """What ``forward`` needs of what ``KeypointTranslator.encode_context`` returns beside z2."""
@@ -169,15 +171,14 @@ class KeypointDecoder(nn.Module):
         x = self.deep(x + self.vector(_vector(z))[:, :, None, None])
         for skip, up, smooth in zip((middle, finest), self.up, self.smooth, strict=True):
             x = smooth(activate(up(x) + skip))
-        carried = torch.cat((first[:, None], _carry(first, before, _places(z))), 1)
-        x = self.output(torch.cat((activate(self.last_up(x)), carried.flatten(1, 2).to(x.dtype)), 1))
-        drawn, logits = x[:, :3].float(), x[:, 3:].float()
-        logits = torch.cat((logits[:, :1] + _COPIED, logits[:, 1:]), 1)
-        masks = logits.softmax(1)
-        flat = _looks(z)[..., :3].float().transpose(1, 2) @ masks[:, -_STROKES:].flatten(2)
-        masks = masks[:, :-_STROKES, None]
-        layers = torch.cat((carried, drawn[:, None]), 1)
-        return (layers * masks).sum(1) + flat.unflatten(2, first.shape[2:])
+        copies = torch.cat((first[:, None], _carry(first, before, _places(z))), 1)
+        x = self.output(torch.cat((activate(self.last_up(x)), copies.flatten(1, 2).to(x.dtype)), 1)).float()
+        masks = torch.cat((x[:, 3:4] + _COPIED, x[:, 4:]), 1).softmax(1)
+        layers = torch.cat((copies, x[:, None, :3]), 1)
+        flat = masks[:, layers.shape[1] :].flatten(2)
+        colours = _looks(z)[..., :3].float().transpose(1, 2)
+        layered = (layers * masks[:, : layers.shape[1], None]).sum(1)
+        return layered + (colours @ flat).unflatten(2, first.shape[2:])
 
 
 class KeypointTranslator(nn.Module):
@@ -232,13 +233,20 @@ class KeypointTranslator(nn.Module):
 
 
 def place_loss(codes: Tensor, marks: Tensor) -> Tensor:
-    """Mean squared distance of the first M keypoints of ``codes`` (N, 2 K + V) from ``marks`` (N, M, 2).
+    """Mean squared distance of the first M keypoints of ``codes`` (N, ...) from ``marks`` (N, M, 2).
 
     Marks are in the keypoints' units. Those far outside of the picture count as just outside, and those that
     are NaN are not known: no keypoint pays for them.
     """
     gaps = _places(codes)[:, : marks.shape[1]].float() - marks.clamp(-_OUTSIDE, _OUTSIDE)
     return torch.where(marks.isnan(), 0.0, gaps).square().sum(-1).mean()
+
+
+def with_places(codes: Tensor, marks: Tensor) -> Tensor:
+    """``codes`` (N, ...) with their first M keypoints at ``marks`` (N, M, 2), where these are known."""
+    known = marks.clamp(-_OUTSIDE, _OUTSIDE).flatten(1).to(codes.dtype)
+    found, others = codes.split((known.shape[1], codes.shape[1] - known.shape[1]), 1)
+    return torch.cat((torch.where(known.isnan(), found, known), others), 1)
 
 
 def _layer(inputs: int, outputs: int, kernel: int, stride: int = 1) -> nn.Sequential:
@@ -255,7 +263,7 @@ def _doubling(inputs: int, outputs: int) -> nn.ConvTranspose2d:
 
 
 def _places(code: Tensor) -> Tensor:
-    """(N, K, 2) of codes (N, 2 K + V)."""
+    """(N, K, 2) of codes (N, 2 K + V + 8 S)."""
     return code[:, : 2 * KEYPOINTS].unflatten(1, (KEYPOINTS, 2))
 
 
@@ -275,16 +283,21 @@ def _axis(like: Tensor) -> Tensor:
     return (2 * torch.arange(side, device=like.device, dtype=torch.float32) + 1) / side - 1
 
 
+def _grid(like: Tensor) -> tuple[Tensor, Tensor]:
+    """x and y (H, W) of the pixels of square maps ``like``."""
+    axis = _axis(like)
+    x, y = torch.meshgrid(axis, axis, indexing="xy")
+    return x, y
+
+
 def _strokes(places: Tensor, like: Tensor) -> Tensor:
     """(N, 2 K - 1, H, W), on maps ``like``: Gaussians of height 1 around ``places`` (N, K, 2) and lines.
 
     There is a line from each keypoint to the next.
     """
-    axis = _axis(like)
-    grid = torch.stack(torch.meshgrid(axis, axis, indexing="xy")).flatten(1)  # (2, H W)
     with torch.autocast(like.device.type, enabled=False):  # differences of squares need all digits
-        squares = _squares(places.float(), grid)
-    return torch.exp(-0.5 * (0.5 * len(axis) / _SIGMA) ** 2 * squares).unflatten(2, like.shape[2:])
+        squares = _squares(places.float(), torch.stack(_grid(like)).flatten(1))
+    return torch.exp(-0.5 * (0.5 * like.shape[-1] / _SIGMA) ** 2 * squares).unflatten(2, like.shape[2:])
 
 
 def _squares(places: Tensor, grid: Tensor) -> Tensor:
@@ -301,22 +314,19 @@ def _squares(places: Tensor, grid: Tensor) -> Tensor:
 def _carry(first: Tensor, before: Tensor, now: Tensor) -> Tensor:
     """First frames (N, 3, H, W) carried by keypoints from ``before`` to ``now`` (N, K, 2): (N, B, 3, H, W).
 
-    A keypoint shifts the picture; a line shifts it with its first end, and turns it as it turns itself.
+    A keypoint shifts the picture. A line shifts it as its first end moves, and turns it as it turns itself.
     """
     before, now = before.float(), now.float()
-    ends = _CARRYING_POINTS + _CARRYING_LINES
-    axis = _axis(first)
-    x, y = torch.meshgrid(axis, axis, indexing="xy")
-    dx, dy = x - now[:, ends, 0, None, None], y - now[:, ends, 1, None, None]  # (N, B, H, W)
+    ends = _SHIFTING + _TURNING
+    x, y = (axis - now[:, ends, i, None, None] for i, axis in enumerate(_grid(first)))  # (N, B, H, W)
     old, new = (
-        F.normalize(places[:, 1:] - places[:, :-1], dim=-1, eps=_SHORT)[:, _CARRYING_LINES]
+        F.normalize(places[:, 1:] - places[:, :-1], dim=-1, eps=_SHORT)[:, _TURNING]
         for places in (before, now)
     )
-    upright = torch.ones_like(before[:, _CARRYING_POINTS, 0])
+    upright = torch.ones_like(before[:, _SHIFTING, 0])
     cosine = torch.cat((upright, (old * new).sum(-1)), 1)[..., None, None]
     sine = torch.cat((0 * upright, old[..., 1] * new[..., 0] - old[..., 0] * new[..., 1]), 1)[..., None, None]
-    turned = torch.stack((cosine * dx - sine * dy, sine * dx + cosine * dy), -1)
-    sources = turned + before[:, ends, None, None]
+    sources = torch.stack((cosine * x - sine * y, sine * x + cosine * y), -1) + before[:, ends, None, None]
     seen = F.grid_sample(first.float(), sources.flatten(1, 2), padding_mode="border", align_corners=False)
     return seen.unflatten(2, (len(ends), first.shape[2])).transpose(1, 2)
 
