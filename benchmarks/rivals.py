@@ -1,15 +1,13 @@
 """Learners and renderers that are known to be fast, beside ours, per second of one processor.
 
-- Environment steps, updates included: ours in lockstep, DDPG of Stable-Baselines3, DDPG of SBX and TD3 of
-  Rejax. All have the same environment, network, batch and number of updates, once with pictures and the
-  translated reward, once with neither: then the reward is the negative distance. Stable-Baselines3 and SBX
-  train one run; Rejax has as many runs as our group has in one compiled program, and calls the environment
-  from there. Compiling is not counted. TD3 has two critics.
+- Environment steps, updates included: ours in lockstep, DDPG of Stable-Baselines3 and of SBX, which train
+  one run. All have the same environment, network, batch and number of updates, once with pictures and the
+  translated reward, once with neither: then the reward is the negative distance. Compiling is not counted.
 - Pictures of 64x64 pixels: ours, and EnvPool's of Gymnasium's Pusher, another arm that pushes something on a
   table, each beside `mujoco.Renderer` on its own scene, shadows and multisampling off in all.
 
 The translator has random weights: its speed is that of a trained one. Rivals that are not installed are left
-out: `pip install sbx-rl rejax envpool`, best in an environment of their own.
+out: `pip install sbx-rl envpool`, best in an environment of their own.
 
 Usage: python benchmarks/rivals.py [learners | renderers]
 """
@@ -41,7 +39,7 @@ from anyview.environments.translated import TranslatedReward
 from anyview.evaluation.runs import explore
 from anyview.learners.common.interfaces import Arrays, RewardSource
 from anyview.learners.ddpg import make_learner
-from anyview.pusher.batch import ACTION_SIZE, ACTIONS, OBSERVATION_LIMIT, PusherBatch, observation_size
+from anyview.pusher.batch import ACTIONS, PusherBatch, observation_size
 from anyview.pusher.contexts import Context, sample_contexts
 from anyview.rewards.demonstration import DemonstrationReward, translate_demonstrations
 
@@ -146,87 +144,11 @@ def _stable(learner: Any, params: Params, context: Context, sees: bool) -> Train
     return train
 
 
-def rejax(params: Params, contexts: Sequence[Context], sees: bool) -> Train:
-    """A group in one compiled program, which begins anew each time."""
-    import jax
-    from rejax import TD3
-
-    algorithm = TD3.create(
-        env=InJax(*make_batch(params, contexts, sees)),
-        actor_kwargs={"activation": "relu"},
-        critic_kwargs={"activation": "relu"},
-        total_timesteps=EPISODES * ACTIONS,
-        eval_freq=EPISODES * ACTIONS,
-        skip_initial_evaluation=True,
-        num_envs=1,
-        num_epochs=round(params.imitation.ddpg.updates_per_step),
-        policy_delay=1,
-        batch_size=params.imitation.ddpg.batch_size,
-        buffer_size=STEPS,
-        fill_buffer=0,
-    ).replace(eval_callback=lambda *_: 0)
-    keys = jax.random.split(jax.random.key(0), len(contexts))
-    compiled = jax.jit(jax.vmap(algorithm.train)).lower(keys).compile()
-
-    def train() -> int:
-        jax.block_until_ready(compiled(keys))
-        return EPISODES * ACTIONS * len(contexts)
-
-    return train
-
-
-class InJax:
-    """A group of runs as Rejax takes an environment: a call steps all of them at once."""
-
-    default_params = None
-
-    def __init__(self, batch: PusherBatch, reward: RewardSource) -> None:
-        self._batch, self._reward = batch, reward
-        self._shape = (observation_size("push", 1),)
-
-    def observation_space(self, params: None) -> Any:
-        from gymnax.environments.spaces import Box
-
-        return Box(-OBSERVATION_LIMIT, OBSERVATION_LIMIT, self._shape)
-
-    def action_space(self, params: None) -> Any:
-        from gymnax.environments.spaces import Box
-
-        return Box(-1.0, 1.0, (ACTION_SIZE,))
-
-    def reset(self, key: Any, params: None) -> Any:
-        import jax
-
-        def work(keys: Any) -> np.ndarray:
-            return self._batch.reset().reshape(*np.shape(keys)[:-1], *self._shape)
-
-        observation = jax.ShapeDtypeStruct(self._shape, np.float32)
-        data = jax.random.key_data(key)
-        return jax.pure_callback(work, observation, data, vmap_method="broadcast_all"), jax.numpy.int32(0)
-
-    def step(self, key: Any, state: Any, action: Any, params: None) -> Any:
-        import jax
-
-        def work(actions: Any) -> tuple[np.ndarray, np.ndarray]:
-            runs = np.shape(actions)[:-1]
-            observations = self._batch.step(np.reshape(actions, (self._batch.count, ACTION_SIZE)))
-            step = self._batch.steps
-            rewards = self._reward.step(self._batch.render()[:, None], step).astype(np.float32)
-            if step == ACTIONS:
-                observations = self._batch.reset()
-            return observations.reshape(*runs, *self._shape), rewards.reshape(runs)
-
-        kinds = (jax.ShapeDtypeStruct(self._shape, np.float32), jax.ShapeDtypeStruct((), np.float32))
-        observation, reward = jax.pure_callback(work, kinds, action, vmap_method="broadcast_all")
-        last = state + 1 == ACTIONS
-        return observation, jax.numpy.where(last, 0, state + 1), reward, last, {}
-
-
 def compare_learners() -> None:
     """Print steps per second of every learner, and how many times as fast ours is."""
     params = comparable_params()
     contexts, _ = sample_contexts(np.random.default_rng(0), RUNS)
-    makers = {"ours": ours} | {make.__name__: make for make in (stable_baselines3, sbx, rejax)}
+    makers = {"ours": ours} | {make.__name__: make for make in (stable_baselines3, sbx)}
     makers = {name: make for name, make in makers.items() if name == "ours" or installed(name)}
     for sees in (True, False):
         print("with pictures and the translated reward:" if sees else "without:")
