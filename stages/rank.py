@@ -12,7 +12,7 @@ from anyview.adversarial import gail, tpil
 from anyview.config import AdversarialCell, Params, load_params
 from anyview.evaluation.methods import MakeLearner, MakeReward, Method
 from anyview.evaluation.runs import groups_of
-from anyview.evaluation.stage import origin, settings
+from anyview.evaluation.stage import draw_contexts, origin, settings
 from anyview.learners import ddpg, trpo
 from anyview.ranking.rollouts import scripted_rollouts
 from anyview.ranking.scores import score_group
@@ -36,7 +36,8 @@ def group_tasks(name: str, params: Params) -> list[tuple[Any, ...]]:
     models = [] if isinstance(cell, AdversarialCell) else [paths.model(cell.model)]
     values, files = origin(name, params, models)
     tasks: list[tuple[Any, ...]] = []
-    for number, setting in enumerate(settings(name, params, CONTEXTS)):
+    contexts = draw_contexts(params, CONTEXTS, params.imitation.runs)
+    for number, setting in enumerate(settings(name, params, contexts)):
         rng = stream(params.base.seed, "scripted", number)
         scripted = scripted_rollouts(setting.contexts, params.beyond.ranking.rollouts, rng)
         for group in groups_of(params.imitation.runs, params.imitation.group):

@@ -1,10 +1,11 @@
 """The whole of ``params.yaml``."""
 
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from anyview.config.data import DemonstrationSet, Real, Simulate, SplitSet
+from anyview.config.evidence import Evidence
 from anyview.config.imitation import (
     Adversarial,
     AdversarialCell,
@@ -12,7 +13,6 @@ from anyview.config.imitation import (
     DemonstrationCell,
     EmbeddingRewardCell,
     Imitation,
-    RewardWeights,
 )
 from anyview.config.translators import Assessment, EmbeddingCell, Training, TranslatorCell
 from anyview.config.values import Block, Count, Name
@@ -50,25 +50,6 @@ class Beyond(Block):
     translators: dict[Name, TranslatorCell]
     cells: dict[Name, BeyondCell]
     ranking: Ranking
-
-
-class Evidence(Block):
-    """Pipeline `evidence`: the translators of figure 20, each trained several times, as models of `ours`."""
-
-    translators: list[str] = Field(
-        min_length=2, description="cells of `translators`; the first has every loss, the others lack some"
-    )
-    seeds: list[Annotated[int, Field(ge=0)]] = Field(
-        min_length=1, description="of the trainings, one of each translator for each seed"
-    )
-    iterations: Count = Field(description="of each training, instead of the cell's own")
-    rewards: dict[Name, RewardWeights] = Field(min_length=1)
-
-    @model_validator(mode="after")
-    def _all_different(self) -> "Evidence":
-        if any(len(set(names)) < len(names) for names in (self.translators, self.seeds)):
-            raise ValueError("a translator or a seed is listed twice")
-        return self
 
 
 class Params(Block):

@@ -1,7 +1,7 @@
 """What stages `imitate` and `discriminate` do: from a cell of params.yaml to the folder of its policies."""
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -53,10 +53,17 @@ class Setting(NamedTuple):
         return {name: value for name, value in names.items() if value is not None}
 
 
-def evaluate_method(name: str, params: Params, method: Method, sources: Sequence[Path]) -> None:
+def evaluate_method(
+    name: str,
+    params: Params,
+    method: Method,
+    sources: Sequence[Path],
+    change: Callable[[Context], Context] | None = None,
+) -> None:
     """Train and evaluate the policies of cell ``name`` into its folder; continues from its checkpoints.
 
-    ``sources`` are the folders that its reward is made from, beside the demonstrations.
+    ``sources`` are the folders that its reward is made from, beside the demonstrations. ``change`` makes of
+    each context the one to act in; the name has to tell which.
 
     - ``runs.csv``: a row for each run, and how it ended;
     - ``curve.csv``: the learning curve of each run;
@@ -68,7 +75,8 @@ def evaluate_method(name: str, params: Params, method: Method, sources: Sequence
     or angle, ``runs.csv`` has the column ``context``, and both tables have ``choice`` or ``angle``.
     """
     shown = params.methods[name].shown
-    every = settings(name, params, shown.contexts)
+    contexts = draw_contexts(params, shown.contexts, params.imitation.runs)
+    every = settings(name, params, [change(context) for context in contexts] if change else contexts)
     numbers = groups_of(params.imitation.runs, params.imitation.group)
     values, files = origin(name, params, sources)
     tasks: list[tuple[Any, ...]] = []
@@ -119,21 +127,20 @@ def draw_contexts(params: Params, name: str, count: int) -> list[Context]:
     return sample_contexts(rng, count, kind, task)[0]
 
 
-def settings(name: str, params: Params, contexts: str) -> list[Setting]:
-    """What cell ``name`` is shown in contexts of the random stream ``contexts``.
+def settings(name: str, params: Params, contexts: list[Context]) -> list[Setting]:
+    """What cell ``name`` is shown in ``contexts``.
 
     One setting; or where clips choose between two goals, or are chosen by their angle, one for each of these.
     """
     cell = params.methods[name]
-    drawn = draw_contexts(params, contexts, params.imitation.runs)
     choices: tuple[Colour | None, ...] = COLOURS if two_goals(params) else (None,)
     angles: Sequence[int | None] = cell.shown.angles or (None,)
 
     def clips(choice: Colour | None, angle: int | None) -> Clips:
         if angle is not None:
-            return angled_demonstrations(params, drawn, angle, choice)
+            return angled_demonstrations(params, contexts, angle, choice)
         if cell.shown.own_clips:
-            return own_demonstrations(params, len(drawn), choice)
+            return own_demonstrations(params, len(contexts), choice)
         if cell.shown.other_experts:
             return rig_demonstrations(params, cell.shown.other_experts)
         clock = cell.reward == "clock"
@@ -141,7 +148,7 @@ def settings(name: str, params: Params, contexts: str) -> list[Setting]:
 
     return [
         Setting(
-            [context.choosing(choice) if choice else context for context in drawn],
+            [context.choosing(choice) if choice else context for context in contexts],
             clips(choice, angle),
             choice,
             angle,
