@@ -16,7 +16,7 @@ pytestmark = pytest.mark.slow
 def beyond(trunk, tmp_path_factory) -> Study:
     """The whole of beyond/ on top of the trunk."""
     study = trunk.copy(tmp_path_factory.mktemp("beyond"))
-    study.run("dvc", "repro", "split@real", "split@rendered")
+    study.run("dvc", "repro", "split@real", "split@rendered", "embed@tcn")
     study = Study(study.folder / "beyond", study.scratch)
     study.run("dvc", "repro")
     return study

@@ -119,6 +119,17 @@ def test_the_committed_params_are_sound():
             {"task": "push", "contexts": "choice", "demos": 4},
             "beyond.split.wide: missing key",
         ),
+        (
+            "beyond.cells.angles.own_clips",
+            False,
+            "beyond.cells.angles: angles: chosen for each context's own camera, which needs own_clips",
+        ),
+        ("beyond.cells.angles.angles", [30, 30], "beyond.cells.angles: angles: one is listed twice"),
+        (
+            "beyond.ranking.methods",
+            ["ours", "sim"],
+            "beyond.ranking.methods: 'sim' is none of these: ours, liu, narrow-ddpg",
+        ),
         ("beyond.cells.clock.own_clips", True, "beyond.cells.clock: own_clips: a clock hears of no clip"),
         (
             "beyond.cells.clips-1.incomplete",

@@ -20,6 +20,8 @@ LABELS = {
     "choice-oracle": "Oracle (true view)",
     "choice-clock": "clock alone",
     "clock": "Clock alone",
+    "angles": "Ours (one clip)",
+    "choice-angles": "Choice (one clip)",
     "human": "A hand's clips (20)",
     "reach": "Reach (20 clips)",
     "reach-oracle": "Reach, Oracle",

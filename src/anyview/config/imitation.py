@@ -1,5 +1,6 @@
 """Methods: learners, rewards, and what is imitated."""
 
+from collections.abc import Sequence
 from typing import Annotated, Literal, NamedTuple
 
 from pydantic import Field, model_validator
@@ -104,6 +105,8 @@ class Shown(NamedTuple):
     """Whether every context has clips of its own."""
     contexts: Literal["evaluation", "tuning"] = "evaluation"
     """The random stream that the contexts are drawn from."""
+    angles: Sequence[int] = ()
+    """Degrees between the cameras of clip and agent, once for each of which every context is run."""
 
 
 class MethodCell(Block):
@@ -194,6 +197,20 @@ class BeyondCell(WithExperts, DemonstrationCell):
         default="evaluation", description="the random stream that the contexts are drawn from"
     )
 
+    angles: list[Annotated[int, Field(ge=0, le=180)]] = Field(
+        default=[],
+        description="degrees between the camera of a clip and the agent's: every context is run once for "
+        "each, with the clips of its own that are nearest to it",
+    )
+
     @property
     def shown(self) -> Shown:
-        return Shown(self.other_experts, self.own_clips, self.contexts)
+        return Shown(self.other_experts, self.own_clips, self.contexts, self.angles)
+
+    @model_validator(mode="after")
+    def _angles_of_own_clips(self) -> "BeyondCell":
+        if self.angles and not self.own_clips:
+            raise ValueError("angles: chosen for each context's own camera, which needs own_clips")
+        if len(set(self.angles)) < len(self.angles):
+            raise ValueError("angles: one is listed twice")
+        return self

@@ -15,7 +15,7 @@ from anyview.config.imitation import (
     Imitation,
 )
 from anyview.config.translators import Assessment, EmbeddingCell, Training, TranslatorCell
-from anyview.config.values import Block, Name
+from anyview.config.values import Block, Count, Name
 
 
 class Base(Block):
@@ -33,6 +33,15 @@ class Sim(Block):
     )
 
 
+class Ranking(Block):
+    """Stage `rank`: scripted rollouts, good and failed ones, under the rewards of methods."""
+
+    methods: list[str] = Field(
+        min_length=1, description="cells of `imitation`, `adversarial` and `beyond`: the methods"
+    )
+    rollouts: Count = Field(description="rollouts of each kind in a context")
+
+
 class Beyond(Block):
     """What goes beyond the thesis, by the pipeline beyond/dvc.yaml: sets and cells as in the blocks above."""
 
@@ -40,6 +49,7 @@ class Beyond(Block):
     split: dict[Name, SplitSet]
     translators: dict[Name, TranslatorCell]
     cells: dict[Name, BeyondCell]
+    ranking: Ranking
 
 
 class Params(Block):

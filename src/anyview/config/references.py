@@ -37,6 +37,8 @@ def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
         yield f"beyond.cells.{key}.dataset", method.dataset, list(params.demonstration_sets)
         yield f"beyond.cells.{key}.experts", method.experts, [method.dataset, REAL]
         yield f"beyond.cells.{key}.model", method.model, list(params.translator_cells)
+    ranked = [*params.methods, *params.beyond.cells]
+    yield from (("beyond.ranking.methods", name, ranked) for name in params.beyond.ranking.methods)
     for block, models in (("translators", params.translators), ("embeddings", params.embeddings)):
         yield from ((f"{block}.{key}.dataset", cell.dataset, sets) for key, cell in models.items())
     for key, translator in params.translators.items():
