@@ -13,7 +13,7 @@ from anyview.config import Params, load_params
 
 _HEAD = """# Params reference
 
-Every key of `params.yaml`, written from the models in `src/anyview/config.py` by
+Every key of `params.yaml`, written from the models in `src/anyview/config/` by
 `python -m anyview.cli.reference`. Values are those of the committed `default` profile. Anything else in the
 file (an unknown key, another type, a value out of range) is refused by its name before any work starts.
 """

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from anyview import paths
-from anyview.config import BeyondCell, Params
+from anyview.config import Params
 from anyview.evaluation.demonstrations import (
     Clips,
     clock_clips,
@@ -47,14 +47,13 @@ def evaluate_method(name: str, params: Params, method: Method, sources: Sequence
     clips of the one choice, then all with clips of the other. ``runs.csv`` has the columns ``context`` and
     ``choice`` then, and ``demonstrations.csv`` has ``choice``.
     """
-    cell = params.methods[name]
-    own = isinstance(cell, BeyondCell) and cell.own_clips
+    own = params.methods[name].shown.own_clips
     imitated = _imitated(name, params)
     numbers = groups_of(params.imitation.runs, params.imitation.group)
     values, files = _origin(name, params, sources)
     tasks: list[tuple[Any, ...]] = []
     acted: list[Context] = []
-    shown = []
+    tables = []
     for choice, contexts, clips in imitated:
         for group in numbers:
             runs = [len(acted) + run for run in group]
@@ -66,7 +65,7 @@ def evaluate_method(name: str, params: Params, method: Method, sources: Sequence
         table = pd.DataFrame({"clip": clips.names} | ({"choice": choice} if choice else {}))
         if own:
             table["context"] = np.repeat(np.arange(len(contexts)), params.imitation.demonstrations)
-        shown.append(table)
+        tables.append(table)
     results = list(run_tasks(evaluate_group, tasks))
     runs = pd.concat([result.runs for result in results], ignore_index=True)
     curve = pd.concat([result.curve for result in results], ignore_index=True)
@@ -74,7 +73,7 @@ def evaluate_method(name: str, params: Params, method: Method, sources: Sequence
         runs.insert(1, "context", runs["run"] % params.imitation.runs)
         runs.insert(2, "choice", [context.choice.colour for context in acted if context.choice])
     with whole_folder(paths.policies(name)) as output:
-        write_atomically(output / "demonstrations.csv", pd.concat(shown).to_csv(index=False))
+        write_atomically(output / "demonstrations.csv", pd.concat(tables).to_csv(index=False))
         write_atomically(output / "runs.csv", runs.to_csv(index=False))
         write_atomically(output / "curve.csv", curve.sort_values(["iteration", "run"]).to_csv(index=False))
         weights = {
@@ -103,14 +102,13 @@ def draw_contexts(params: Params, name: str, count: int) -> list[Context]:
 def _imitated(name: str, params: Params) -> list[tuple[Colour | None, list[Context], Clips]]:
     """For each choice, or the only task: the contexts to act in and the clips that are imitated there."""
     cell = params.methods[name]
-    beyond = cell if isinstance(cell, BeyondCell) else None
-    contexts = draw_contexts(params, beyond.contexts if beyond else "evaluation", params.imitation.runs)
+    contexts = draw_contexts(params, cell.shown.contexts, params.imitation.runs)
 
     def clips(choice: Colour | None = None) -> Clips:
-        if beyond and beyond.own_clips:
+        if cell.shown.own_clips:
             return own_demonstrations(params, len(contexts), choice)
-        if beyond and beyond.other_experts:
-            return rig_demonstrations(params, beyond.other_experts)
+        if cell.shown.other_experts:
+            return rig_demonstrations(params, cell.shown.other_experts)
         clock = cell.reward == "clock"
         return clock_clips(params) if clock else imitated_demonstrations(params, choice)
 
@@ -124,9 +122,7 @@ def _origin(name: str, params: Params, sources: Sequence[Path]) -> tuple[list[An
     values = params.model_dump(include={"base", "sim", "imitation", "adversarial"})
     for block in ("imitation", "adversarial"):
         values[block]["cells"] = values[block]["cells"].get(name)
-    cell = params.methods[name]
-    datasets = [params.imitation.dataset]
-    if isinstance(cell, BeyondCell) and cell.other_experts:
-        datasets.append(cell.other_experts)
+    other = params.methods[name].shown.other_experts
+    datasets = [params.imitation.dataset, *([other] if other else [])]
     files = [file for dataset in datasets for file in dataset_files(dataset)]
     return [name, values], files + [file for source in sources for file in sorted(source.iterdir())]

@@ -1,0 +1,199 @@
+"""Methods: learners, rewards, and what is imitated."""
+
+from typing import Annotated, Literal, NamedTuple
+
+from pydantic import Field, model_validator
+
+from anyview.config.values import (
+    Block,
+    Count,
+    CountOrNone,
+    Discount,
+    Fraction,
+    Name,
+    NonNegative,
+    Positive,
+    WithExperts,
+)
+
+
+class DDPG(Block):
+    """Deep deterministic policy gradient."""
+
+    hidden: list[Count] = Field(min_length=1, description="widths of policy and critic")
+    policy_learning_rate: Positive = Field(description="Adam's rate for the policy")
+    critic_learning_rate: Positive = Field(description="Adam's rate for the critic")
+    discount: Discount = Field(description="weight of the next step's return")
+    batch_size: Count
+    updates_per_step: Positive = Field(description="updates for each step that a run acts in its context")
+    preactivation_penalty: NonNegative = Field(
+        description="weight in the policy's loss of the squared inputs of its tanh; 0 leaves it out"
+    )
+    target_rate: Annotated[float, Field(gt=0, le=1)] = Field(description="Polyak rate of the target networks")
+    replay: Count = Field(description="transitions kept per run")
+    recent_episodes: Count = Field(description="half of each batch comes from this many newest episodes")
+    warmup_episodes: CountOrNone = Field(description="episodes of noise alone before updates start")
+    n_step: Annotated[int, Field(ge=1, le=49)] = Field(description="rewards summed before bootstrapping")
+    time_features: CountOrNone = Field(
+        description="radial basis functions of time beside the observation; 0 leaves them out"
+    )
+    noise: Positive = Field(description="Ornstein-Uhlenbeck deviation at first, in units of the action range")
+    noise_end: Positive = Field(description="the same at the end; it falls geometrically")
+    noise_theta: Fraction = Field(description="Ornstein-Uhlenbeck mean reversion per step; 1 is white noise")
+
+
+class TRPO(Block):
+    """Trust-region policy optimisation."""
+
+    hidden: list[Count] = Field(min_length=1, description="widths of the policy")
+    initial_std: Positive = Field(description="of the Gaussian policy, in units of the action range")
+    batch_episodes: Count = Field(description="episodes per policy step")
+    discount: Discount = Field(description="weight of the next step's return")
+    gae_lambda: Fraction = Field(description="of generalised advantage estimation")
+    step: Positive = Field(description="bound on the mean KL divergence")
+    damping: NonNegative = Field(description="added to the Fisher matrix's diagonal")
+    conjugate_gradient_steps: Count = Field(description="for each policy step")
+
+
+class Discriminator(Block):
+    """Image discriminators of TPIL and GAIL."""
+
+    batch_size: Count
+    learning_rate: Positive
+    steps: Count = Field(description="steps of the discriminator after the episodes of each policy step")
+    domain_weight: NonNegative = Field(description="gradient reversal of TPIL's domain head")
+
+
+class RewardWeights(Block):
+    """Weights of a reward's terms, in units of what standing still costs unless `raw`; 0 leaves one out."""
+
+    feature: NonNegative = Field(description="of L_f, the distance of features")
+    image: NonNegative = Field(description="of L_i, the distance of pixels: phi where `feature` is 1")
+    raw: bool = Field(default=False, description="the terms in their own units, as in equation 22")
+
+    @model_validator(mode="after")
+    def _some_term(self) -> "RewardWeights":
+        if self.feature == self.image == 0:
+            raise ValueError("at least one weight must be above 0")
+        return self
+
+
+class Incomplete(Block):
+    """Clips that lack frames. The reward is given only at the steps of which there is a frame."""
+
+    every: Annotated[int, Field(ge=1, le=49)] = Field(
+        default=1, description="n where every n-th frame is there, from the first on"
+    )
+    until: Annotated[float, Field(gt=0, le=1)] = Field(
+        default=1.0, description="the part of the clip, from its start, after which there is none"
+    )
+
+    @model_validator(mode="after")
+    def _some_frame(self) -> "Incomplete":
+        if self.every > 49 * self.until:
+            raise ValueError("no frame but the first would be left")
+        return self
+
+
+class Shown(NamedTuple):
+    """What the runs of a method are shown, and where: in the thesis's study all of them the same clips."""
+
+    other_experts: str | None = None
+    """The set of the clips if it is not that of the task."""
+    own_clips: bool = False
+    """Whether every context has clips of its own."""
+    contexts: Literal["evaluation", "tuning"] = "evaluation"
+    """The random stream that the contexts are drawn from."""
+
+
+class MethodCell(Block):
+    """A cell of any stage that trains policies."""
+
+    @property
+    def shown(self) -> Shown:
+        """What its runs are shown."""
+        return Shown()
+
+
+class DemonstrationCell(MethodCell):
+    """One method rewarded by a demonstration in the agent's own view (equations 20 to 22)."""
+
+    learner: Literal["ddpg", "trpo"]
+    reward: Literal["translated", "true", "clock"] = Field(
+        description="what is matched: the translated demonstrations, the true one (the oracle), or what the "
+        "translator makes of no clip but the time step (the clock)"
+    )
+    model: str = Field(description="the translator: a cell of `translators`")
+    weights: RewardWeights
+    time_power: NonNegative = Field(description="reward at step t is weighted by (t/49) to this power")
+    incomplete: Incomplete = Field(
+        default=Incomplete(),
+        description="which frames there are: every n-th (`every`), up to a part of the clip (`until`)",
+    )
+
+
+class EmbeddingRewardCell(MethodCell):
+    """One method rewarded by the distance to demonstrations in an embedding, which nothing translates."""
+
+    learner: Literal["ddpg", "trpo"]
+    reward: Literal["embedding"]
+    model: str = Field(description="the embedding: a cell of `embeddings`")
+    time_power: NonNegative = Field(description="reward at step t is weighted by (t/49) to this power")
+
+
+ImitationCell = DemonstrationCell | EmbeddingRewardCell
+
+
+class Imitation(Block):
+    """Stage `imitate`: policies and their evaluation. `discriminate` shares all but the cells."""
+
+    dataset: str = Field(description="simulated set whose held-out clips are imitated")
+    demonstrations: Count = Field(description="clips that are imitated, the same for every run and method")
+    runs: Count = Field(description="contexts, each with a policy of its own")
+    group: Count = Field(description="runs in lockstep: with 2, 15 runs keep 8 cores busy instead of 2")
+    iterations: Count
+    episodes_per_iteration: Count = Field(
+        description="episodes of 49 steps that each run acts in an iteration"
+    )
+    ddpg: DDPG
+    trpo: TRPO
+    cells: dict[Name, Annotated[ImitationCell, Field(discriminator="reward")]]
+
+
+class AdversarialCell(MethodCell):
+    """One method whose reward a discriminator learns while the agent does."""
+
+    learner: Literal["trpo"] = Field(description="discriminators learn from the batches of trpo")
+    reward: Literal["tpil", "gail"]
+
+
+class Adversarial(Block):
+    """Stage `discriminate`: TPIL and GAIL, with the runs and learners of `imitation`."""
+
+    discriminator: Discriminator
+    cells: dict[Name, AdversarialCell]
+
+
+class BeyondCell(WithExperts, DemonstrationCell):
+    """One method of the studies beyond the thesis, with the runs and learners of `imitation`."""
+
+    dataset: str = Field(
+        description="simulated set whose task is done; where its clips choose between two goals, every "
+        "context is run twice, once for each"
+    )
+    experts: str = Field(
+        description="set whose held-out clips are imitated: that of the rig's clips, or `dataset` itself"
+    )
+    demonstrations: Count = Field(
+        description="clips that are imitated, of each choice; of a `clock`, training clips that it averages"
+    )
+    own_clips: bool = Field(
+        default=False, description="every context imitates clips of its own, not all of them the same"
+    )
+    contexts: Literal["evaluation", "tuning"] = Field(
+        default="evaluation", description="the random stream that the contexts are drawn from"
+    )
+
+    @property
+    def shown(self) -> Shown:
+        return Shown(self.other_experts, self.own_clips, self.contexts)

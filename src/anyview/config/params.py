@@ -1,0 +1,119 @@
+"""The whole of ``params.yaml``."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from anyview.config.data import DemonstrationSet, Real, Simulate, SplitSet
+from anyview.config.imitation import (
+    Adversarial,
+    AdversarialCell,
+    BeyondCell,
+    DemonstrationCell,
+    EmbeddingRewardCell,
+    Imitation,
+    RewardWeights,
+)
+from anyview.config.translators import Assessment, EmbeddingCell, Training, TranslatorCell
+from anyview.config.values import Block, Count, Name
+
+
+class Base(Block):
+    """Shared by every stage."""
+
+    seed: int = Field(ge=0, description="root of every named random stream")
+
+
+class Sim(Block):
+    """The simulated world, the same for demonstrations and agents."""
+
+    image_size: Literal[32, 64, 128] = Field(description="height and width of a frame in pixels")
+    control: Literal["twist", "torque"] = Field(
+        description="the agent's action: end-effector twist or joint torques"
+    )
+
+
+class Beyond(Block):
+    """What goes beyond the thesis, by the pipeline beyond/dvc.yaml: sets and cells as in the blocks above."""
+
+    sets: dict[Name, DemonstrationSet]
+    split: dict[Name, SplitSet]
+    translators: dict[Name, TranslatorCell]
+    cells: dict[Name, BeyondCell]
+
+
+class Evidence(Block):
+    """Pipeline `evidence`: the translators of figure 20, each trained several times, as models of `ours`."""
+
+    translators: list[str] = Field(
+        min_length=2, description="cells of `translators`; the first has every loss, the others lack some"
+    )
+    seeds: list[Annotated[int, Field(ge=0)]] = Field(
+        min_length=1, description="of the trainings, one of each translator for each seed"
+    )
+    iterations: Count = Field(description="of each training, instead of the cell's own")
+    rewards: dict[Name, RewardWeights] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _all_different(self) -> "Evidence":
+        if any(len(set(names)) < len(names) for names in (self.translators, self.seeds)):
+            raise ValueError("a translator or a seed is listed twice")
+        return self
+
+
+class Params(Block):
+    """The whole of ``params.yaml``."""
+
+    base: Base
+    sim: Sim
+    simulate: Simulate
+    real: Real
+    split: dict[Name, SplitSet]
+    training: Training
+    translators: dict[Name, TranslatorCell]
+    embeddings: dict[Name, EmbeddingCell]
+    assessment: Assessment
+    imitation: Imitation
+    adversarial: Adversarial
+    beyond: Beyond
+    evidence: Evidence
+
+    @property
+    def demonstration_sets(self) -> dict[str, DemonstrationSet]:
+        """Every simulated set, of the thesis and beyond."""
+        return {**self.simulate.sets, **self.beyond.sets}
+
+    @property
+    def splits(self) -> dict[str, SplitSet]:
+        """How every set of clips is split."""
+        return {**self.split, **self.beyond.split}
+
+    @property
+    def translator_cells(self) -> dict[str, TranslatorCell]:
+        """Every translator, of the thesis and beyond."""
+        return {**self.translators, **self.beyond.translators}
+
+    def going_beyond(self, *beside: str) -> "Params":
+        """These params with the sets and cells of `beyond`, and methods ``beside`` them, for the thesis's."""
+        cells = {**self.beyond.cells, **{name: self.imitation.cells[name] for name in beside}}
+        return self.model_copy(
+            update={
+                "simulate": self.simulate.model_copy(update={"sets": self.beyond.sets}),
+                "split": self.beyond.split,
+                "translators": self.beyond.translators,
+                "embeddings": {},
+                "imitation": self.imitation.model_copy(update={"cells": cells}),
+                "adversarial": self.adversarial.model_copy(update={"cells": {}}),
+            }
+        )
+
+    def imitating(self, name: str) -> "Params":
+        """These params with the cell ``name`` of `beyond` as one of `imitation`, which has its clips."""
+        cell = self.beyond.cells[name]
+        changed = {"dataset": cell.dataset, "demonstrations": cell.demonstrations, "cells": {name: cell}}
+        return self.model_copy(update={"imitation": self.imitation.model_copy(update=changed)})
+
+    @property
+    def methods(self) -> dict[str, DemonstrationCell | EmbeddingRewardCell | AdversarialCell]:
+        """Every method of the thesis's study, by its cell's name."""
+        return {**self.imitation.cells, **self.adversarial.cells}

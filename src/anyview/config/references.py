@@ -1,0 +1,111 @@
+"""Names and numbers that must fit those of other keys."""
+
+from collections.abc import Collection, Iterator
+
+from anyview.config.explanations import brief
+from anyview.config.params import Params
+from anyview.paths import REAL, RENDERED
+from anyview.runtime.errors import AnyviewError
+
+
+def check_references(params: Params, name: str) -> None:
+    """Raise AnyviewError, with the key's name in the file ``name``, if a key does not fit the others."""
+    _refuse_twins(params, name)
+    for key, found, fitting in _references(params):
+        if found not in fitting:
+            listed = ", ".join(fitting) or "none yet"
+            raise AnyviewError(f"{name}: {key}: {brief(found)} is none of these: {listed}")
+    _refuse_pretraining_alone(params, name)
+    _refuse_clips_that_nobody_sees(params, name)
+
+
+def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
+    """Names in ``params`` that must be those of other keys: (dotted key, name, the names that fit)."""
+    sets = [*params.simulate.sets, REAL, RENDERED]
+    yield from ((f"split.{name}", name, sets) for name in params.split)
+    yield from ((f"beyond.split.{name}", name, list(params.beyond.sets)) for name in params.beyond.split)
+    for key, beyond in params.beyond.translators.items():
+        yield f"beyond.translators.{key}.dataset", beyond.dataset, list(params.demonstration_sets)
+        yield (
+            f"beyond.translators.{key}.pretraining.dataset",
+            beyond.pretraining.dataset,
+            [REAL, RENDERED] if beyond.other_experts else list(params.demonstration_sets),
+        )
+        if beyond.other_experts:
+            yield f"beyond.translators.{key}.experts", beyond.other_experts, [REAL, RENDERED]
+    for key, method in params.beyond.cells.items():
+        yield f"beyond.cells.{key}.dataset", method.dataset, list(params.demonstration_sets)
+        yield f"beyond.cells.{key}.experts", method.experts, [method.dataset, REAL]
+        yield f"beyond.cells.{key}.model", method.model, list(params.translator_cells)
+    for block, models in (("translators", params.translators), ("embeddings", params.embeddings)):
+        yield from ((f"{block}.{key}.dataset", cell.dataset, sets) for key, cell in models.items())
+    for key, translator in params.translators.items():
+        yield f"translators.{key}.pretraining.dataset", translator.pretraining.dataset, sets
+        if translator.experts:
+            yield f"translators.{key}.experts", translator.experts, [translator.dataset]
+    yield "imitation.dataset", params.imitation.dataset, list(params.simulate.sets)
+    for key, cell in params.imitation.cells.items():
+        fitting = params.embeddings if cell.reward == "embedding" else params.translators
+        yield f"imitation.cells.{key}.model", cell.model, fitting
+    yield from (("evidence.translators", name, params.translators) for name in params.evidence.translators)
+
+
+def _refuse_clips_that_nobody_sees(params: Params, name: str) -> None:
+    """Refuse clips of its own or of other experts for a clock, and both for any method."""
+    for key, cell in params.beyond.cells.items():
+        clock = cell.reward == "clock"
+        if clock and cell.own_clips:
+            raise AnyviewError(f"{name}: beyond.cells.{key}: own_clips: a clock hears of no clip")
+        if cell.other_experts and (clock or cell.own_clips):
+            raise AnyviewError(
+                f"{name}: beyond.cells.{key}.experts: other experts' clips are the same for every context, "
+                "and no clock's"
+            )
+
+
+def _refuse_pretraining_alone(params: Params, name: str) -> None:
+    """Refuse a translator that would never see clips of its own, or whose other clips nobody would open."""
+    blocks = {"translators": params.translators, "beyond.translators": params.beyond.translators}
+    for block, cells in blocks.items():
+        for key, cell in cells.items():
+            before, all_of_them = cell.pretraining.iterations, cell.iterations
+            if before >= all_of_them:
+                raise AnyviewError(
+                    f"{name}: {block}.{key}.pretraining.iterations: {before} must be below "
+                    f"{block}.{key}.iterations, {all_of_them}, which counts them"
+                )
+    for key in params.evidence.translators:
+        if params.translators[key].pretraining.iterations:
+            raise AnyviewError(
+                f"{name}: evidence.translators: {key} pretrains (translators.{key}.pretraining.iterations), "
+                "and those of the evidence do not"
+            )
+
+
+def _refuse_twins(params: Params, name: str) -> None:
+    """Refuse two cells that would write to one folder, and a set of clips that is never split."""
+    made = [*params.simulate.sets, REAL, RENDERED]
+    for block, key, other, taken in (
+        ("embeddings", params.embeddings, "translators", params.translators),
+        ("adversarial.cells", params.adversarial.cells, "imitation.cells", params.imitation.cells),
+        ("simulate.sets", params.simulate.sets, "the clips that stage ingest makes", [REAL]),
+        ("beyond.sets", params.beyond.sets, "simulate.sets, ingest or render", made),
+        (
+            "beyond.translators",
+            params.beyond.translators,
+            "translators or embeddings",
+            [*params.translators, *params.embeddings],
+        ),
+        ("beyond.cells", params.beyond.cells, "imitation.cells or adversarial.cells", params.methods),
+        ("simulate.sets", params.simulate.sets, "the clips that stage render makes", [RENDERED]),
+    ):
+        for cell in key:
+            if cell in taken:
+                raise AnyviewError(f"{name}: {block}.{cell}: the name is taken by {other}")
+    for block, sets, split in (
+        ("split", made, params.split),
+        ("beyond.split", params.beyond.sets, params.beyond.split),
+    ):
+        for dataset in sets:
+            if dataset not in split:
+                raise AnyviewError(f"{name}: {block}.{dataset}: missing key")
