@@ -19,11 +19,15 @@ def main(arguments: list[str]) -> None:
     name = choose(arguments, params.beyond.translators, "python train.py CELL")
     cell = params.beyond.translators[name]
     dataset, pretraining = open_learnt(cell)
-    if cell.weights.places:
+    if cell.other_experts and cell.weights.places:
         marks = simulated_marks(dataset)
         dataset = replace(dataset, marks=marks)
         pretraining = pretraining and replace(pretraining, marks=marks)
-    fit(name, TranslatorObjective(cell, params.training, params.base.seed, dataset, pretraining), paths.model(name))
+    fit(
+        name,
+        TranslatorObjective(cell, params.training, params.base.seed, dataset, pretraining),
+        paths.model(name),
+    )
 
 
 if __name__ == "__main__":

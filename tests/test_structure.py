@@ -153,9 +153,10 @@ def covers(dependency: str, file: str) -> bool:
 SCRIPTS = [
     *((path, ROOT) for path in STAGES),
     *((EVIDENCE / f"{name}.py", EVIDENCE) for name in ("train", "imitate")),
+    *((BEYOND / f"{name}.py", BEYOND) for name in ("train", "embed")),
     *(
         (BEYOND / "stages" / f"{name}.py", BEYOND)
-        for name in ("simulate", "split", "train", "translate", "imitate", "report")
+        for name in ("simulate", "split", "translate", "imitate", "report")
     ),
 ]
 
@@ -244,6 +245,7 @@ def test_cells_are_those_of_params():
         ("split", beyond.split),
         ("train", beyond.translators),
         ("translate", beyond.translators),
+        ("embed", beyond.embeddings),
         ("imitate", beyond.cells),
     ):
         assert cells[f"beyond {stage}"] == set(named)
@@ -259,7 +261,7 @@ def test_cells_are_those_of_params():
     ("folder", "unread", "from_the_study"),
     [
         (ROOT, {"data/raw/surrogate", "data/clips/rendered", "data/splits/rendered.csv"}, set()),
-        (BEYOND, set(), {"data/policies/ours", "data/clips/real"}),
+        (BEYOND, {"data/models/xirl"}, {"data/policies/ours", "data/clips/real"}),
     ],
     ids=["study", "beyond"],
 )

@@ -58,7 +58,7 @@ def test_points_are_seen_where_the_camera_of_mujoco_sees_them():
 
 def test_marks_are_where_object_target_and_tool_are_seen(simulated, marks):
     """By their colours, with nothing in front of the target in the first frame and of the object mostly."""
-    contexts, _, dataset = simulated
+    _, _, dataset = simulated
     assert marks.shape == (10, 50, 5, 2)
     assert marks.dtype == np.float32
     found = np.stack([[find_object(frame) for frame in clip[::7]] for clip in dataset.frames])
@@ -105,5 +105,5 @@ def test_joints_are_those_of_the_arm_or_where_it_leaves_the_picture(simulated, m
 
 def test_a_set_that_tells_no_contexts_is_refused(simulated):
     _, _, dataset = simulated
-    with pytest.raises(AnyviewError, match="data/clips/diverse/manifest.csv: no column context"):
+    with pytest.raises(AnyviewError, match=r"data/clips/diverse/manifest\.csv: no column context"):
         simulated_marks(Dataset("diverse", dataset.frames, dataset.clips.drop(columns="context")))

@@ -21,6 +21,7 @@ LABELS = {
     "choice-clock": "clock alone",
     "clock": "Clock alone",
     "human": "A hand's clips (20)",
+    "human-xirl": "A hand's clips, XIRL",
     "reach": "Reach (20 clips)",
     "reach-oracle": "Reach, Oracle",
     "strike": "Strike (20 clips)",

@@ -174,8 +174,8 @@ class Adversarial(Block):
     cells: dict[Name, AdversarialCell]
 
 
-class BeyondCell(WithExperts, DemonstrationCell):
-    """One method of the studies beyond the thesis, with the runs and learners of `imitation`."""
+class BeyondMethodCell(WithExperts, MethodCell):
+    """A method of the studies beyond the thesis, with the runs and learners of `imitation`."""
 
     dataset: str = Field(
         description="simulated set whose task is done; where its clips choose between two goals, every "
@@ -197,3 +197,15 @@ class BeyondCell(WithExperts, DemonstrationCell):
     @property
     def shown(self) -> Shown:
         return Shown(self.other_experts, self.own_clips, self.contexts)
+
+
+class BeyondCell(BeyondMethodCell, DemonstrationCell):
+    """One method of the studies beyond the thesis, with the runs and learners of `imitation`."""
+
+
+class GoalCell(BeyondMethodCell):
+    """One method rewarded by the distance to the demonstrations' last frames in an embedding: XIRL."""
+
+    learner: Literal["ddpg", "trpo"]
+    reward: Literal["goal"]
+    model: str = Field(description="the embedding: a cell of `beyond.embeddings`")

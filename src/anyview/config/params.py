@@ -11,10 +11,11 @@ from anyview.config.imitation import (
     BeyondCell,
     DemonstrationCell,
     EmbeddingRewardCell,
+    GoalCell,
     Imitation,
     RewardWeights,
 )
-from anyview.config.translators import Assessment, EmbeddingCell, Training, TranslatorCell
+from anyview.config.translators import Assessment, CycleCell, EmbeddingCell, Training, TranslatorCell
 from anyview.config.values import Block, Count, Name
 
 
@@ -39,7 +40,8 @@ class Beyond(Block):
     sets: dict[Name, DemonstrationSet]
     split: dict[Name, SplitSet]
     translators: dict[Name, TranslatorCell]
-    cells: dict[Name, BeyondCell]
+    embeddings: dict[Name, CycleCell]
+    cells: dict[Name, Annotated[BeyondCell | GoalCell, Field(discriminator="reward")]]
 
 
 class Evidence(Block):
@@ -114,6 +116,6 @@ class Params(Block):
         return self.model_copy(update={"imitation": self.imitation.model_copy(update=changed)})
 
     @property
-    def methods(self) -> dict[str, DemonstrationCell | EmbeddingRewardCell | AdversarialCell]:
+    def methods(self) -> dict[str, DemonstrationCell | EmbeddingRewardCell | GoalCell | AdversarialCell]:
         """Every method of the thesis's study, by its cell's name."""
         return {**self.imitation.cells, **self.adversarial.cells}

@@ -1,6 +1,6 @@
 """Translators and embeddings: what each learns from, how they train, how they are assessed."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
@@ -76,6 +76,20 @@ class EmbeddingCell(Block):
     iterations: Count
     dimensions: Count = Field(description="size of the embedding")
     margin: Positive = Field(description="triplet margin")
+
+
+class CycleCell(WithExperts):
+    """Stage `embed` of the pipeline beyond: XIRL's embedding, by cycles in time between whole clips."""
+
+    dataset: str = Field(description="set of clips to learn from")
+    experts: str = Field(description="set of the other half of the clips: of the rig, or `dataset` itself")
+    iterations: Count
+    dimensions: Count = Field(description="size of the embedding")
+    clips: Annotated[int, Field(ge=4, le=1000, multiple_of=2)] = Field(
+        description="clips in a batch, half of them of the experts"
+    )
+    frames: Annotated[int, Field(ge=2, le=1000)] = Field(description="frames of each, all of it at most")
+    temperature: Positive = Field(description="of the softmax over frames, by squared distance per dimension")
 
 
 class Training(Block):

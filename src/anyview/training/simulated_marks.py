@@ -27,9 +27,8 @@ _AT_ONCE = 500  # clips
 def simulated_marks(dataset: Dataset) -> np.ndarray:
     """Of each frame of a simulated set the marks that rendered scenes have, float32 (N, 50, 5, 2) in pixels.
 
-    These are object, target, tool, and the two joints that a human's wrist and elbow stand for: instead of one
-    outside of the picture the place where the arm leaves it. Raises AnyviewError if the manifest tells no
-    contexts.
+    These are object, target, tool, and for wrist and elbow the arm's last two joints: instead of one outside
+    of the picture the place where the arm leaves it. Raises AnyviewError if the manifest tells no contexts.
     """
     if "context" not in dataset.clips:
         manifest = paths.clip_set(dataset.name) / "manifest.csv"
