@@ -1,14 +1,15 @@
 """Is XIRL sound? Where expert and agent share body and view, its reward must teach the task.
 
-One camera for all, no distractors; else contexts are as diverse as ever, those of the agents of the stream
-"tuning", never the evaluation's. The embedding, its training, learner and params are the pipeline's. Agents
-are rewarded by the distance to the last frame of one clip in their own context (`own`), or to the mean of 20
-last frames in others (`others`), as `human-xirl` is. Beside the policies: the rewards of last frames whose
-object is off by some centimetres.
+One camera for all, no distractors; objects and the arm's starts are as diverse as ever, and with `goal` the
+goal is one, as in XIRL's own tasks. Agents' contexts are of the stream "tuning", never the evaluation's. The
+embedding, its training, learner and params are the pipeline's. Agents are rewarded by the distance to the last
+frame of one clip in their own context (`own`), or to the mean of 20 last frames in others (`others`), as
+`human-xirl` is. Beside the policies: the rewards of last frames whose object is off by some centimetres.
 
-Usage: python benchmarks/xirl_shared_view.py [UPDATES]   (default: those of the cell)
+Usage: python benchmarks/xirl_shared_view.py [goal] [UPDATES]   (default: those of the cell)
 """
 
+import math
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -37,13 +38,19 @@ from anyview.video.datasets import Dataset
 
 RUNS, CLIPS, HELD_OUT, SHOWN = 8, 400, 40, 20
 OFF = (0.0, 0.02, 0.04, 0.08, 0.16)  # metres
+GOAL, NEAR = (0.75, 0.0), 0.08  # metres
 
 
-def draw(params: Params, name: str, count: int) -> tuple[list[Context], np.ndarray]:
+def draw(params: Params, name: str, count: int, one_goal: bool) -> tuple[list[Context], np.ndarray]:
     """Contexts of the stream ``name`` before one camera, and where the expert is in each (N, 50, 5)."""
-    contexts, _ = sample_contexts(stream(params.base.seed, name), count)
-    plain = [replace(context, azimuth=0.0, distractors=()) for context in contexts]
-    return plain, roll_out(plain)[0]
+    rng = stream(params.base.seed, name)
+    plain: list[Context] = []
+    while len(plain) < count:
+        for context in sample_contexts(rng, count)[0]:
+            goal = GOAL if one_goal else context.goal_xy
+            if math.dist(goal, context.goal_xy) < NEAR:
+                plain.append(replace(context, goal_xy=goal, azimuth=0.0, distractors=()))
+    return plain[:count], roll_out(plain[:count])[0]
 
 
 def film(params: Params, contexts: list[Context], positions: np.ndarray) -> np.ndarray:
@@ -73,12 +80,14 @@ def train(params: Params, clips: np.ndarray, updates: int) -> Embedding:
 def main() -> None:
     """Train the embedding, look at its rewards, train policies by them."""
     params = load_params()
-    updates = int(sys.argv[1]) if len(sys.argv) > 1 else params.beyond.embeddings["xirl"].iterations
-    seen = draw(params, "benchmark/xirl", CLIPS)
+    one_goal = "goal" in sys.argv
+    numbers = [int(argument) for argument in sys.argv if argument.isdigit()]
+    updates = numbers[0] if numbers else params.beyond.embeddings["xirl"].iterations
+    seen = draw(params, "benchmark/xirl", CLIPS, one_goal)
     clips = film(params, *seen)
     model = train(params, clips, updates)
 
-    contexts, positions = draw(params, "tuning", RUNS)
+    contexts, positions = draw(params, "tuning", RUNS, one_goal)
     own = film(params, contexts, positions)
     rewards = {
         "own": GoalReward(model, own[:, None], own[:, 0]),
@@ -105,7 +114,7 @@ def main() -> None:
             return Scoring(reward, reward.scales, first_demonstration(group), fixed=True)
 
         method = Method(ddpg.make_learner, make_reward)
-        scratch = checkpoint_folder(["xirl_shared_view", name, updates])
+        scratch = checkpoint_folder(["xirl_shared_view", name, updates, one_goal])
         runs = evaluate_group(
             "human-xirl", params, method, range(RUNS), contexts, own[:1], Path(scratch)
         ).runs

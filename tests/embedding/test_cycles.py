@@ -12,7 +12,7 @@ from anyview.embedding.cycles import cycle_loss, time_error
 
 def soft_nearest(frame: np.ndarray, clip: np.ndarray, temperature: float) -> list[float]:
     """Weights of the frames of ``clip`` by their likeness to ``frame``."""
-    scores = [math.exp(-sum((frame - other) ** 2) / len(frame) / temperature) for other in clip]
+    scores = [math.exp(-sum((frame - other) ** 2) / temperature) for other in clip]
     return [score / sum(scores) for score in scores]
 
 

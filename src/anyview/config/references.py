@@ -29,15 +29,12 @@ def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
     simulated = params.demonstration_sets
     pushes = [name for name, wanted in simulated.items() if wanted.task == _HANDS_TASK]
     for key, beyond in params.beyond.translators.items():
-        task_fits = pushes if beyond.other_experts else list(simulated)
-        yield f"beyond.translators.{key}.dataset", beyond.dataset, task_fits
-        yield (
-            f"beyond.translators.{key}.pretraining.dataset",
-            beyond.pretraining.dataset,
-            [REAL, RENDERED] if beyond.other_experts else list(params.demonstration_sets),
-        )
+        yield f"beyond.translators.{key}.dataset", beyond.dataset, list(simulated)
         if beyond.other_experts:
             yield f"beyond.translators.{key}.experts", beyond.other_experts, [REAL, RENDERED]
+            yield f"beyond.translators.{key}.dataset", beyond.dataset, pushes
+        before = [REAL, RENDERED] if beyond.other_experts else list(simulated)
+        yield f"beyond.translators.{key}.pretraining.dataset", beyond.pretraining.dataset, before
     for key, method in params.beyond.cells.items():
         yield f"beyond.cells.{key}.dataset", method.dataset, list(params.demonstration_sets)
         yield f"beyond.cells.{key}.experts", method.experts, [method.dataset, REAL]

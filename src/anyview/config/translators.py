@@ -89,7 +89,7 @@ class CycleCell(WithExperts):
         description="clips in a batch, half of them of the experts"
     )
     frames: Annotated[int, Field(ge=2, le=1000)] = Field(description="frames of each, all of it at most")
-    temperature: Positive = Field(description="of the softmax over frames, by squared distance per dimension")
+    temperature: Positive = Field(description="of the softmax over frames, by squared distance")
 
 
 class Training(Block):

@@ -13,7 +13,7 @@ def cycle_loss(embedded: Tensor, times: Tensor, temperature: float) -> Tensor:
     """Mean squared error of the time that a frame comes back at, over all ordered pairs of S clips.
 
     ``embedded`` (S, K, D) are K frames of each, of any length. ``times`` (S, K) are when these are, as parts
-    of their clips, 0 to 1. Similarity is -|a - b|^2 / (D temperature).
+    of their clips, 0 to 1. Similarity is -|a - b|^2 / temperature.
     """
     here, there = (~torch.eye(len(embedded), dtype=torch.bool, device=embedded.device)).nonzero(as_tuple=True)
     one, other = embedded[here], embedded[there]
@@ -36,4 +36,4 @@ def time_error(one: Tensor, other: Tensor) -> Tensor:
 def _similarities(one: Tensor, other: Tensor, temperature: float) -> Tensor:
     """(P, K, L) of frames (P, K, D) and (P, L, D)."""
     squares = one.square().sum(-1)[..., None] + other.square().sum(-1)[:, None] - 2 * one @ other.mT
-    return -squares / (one.shape[-1] * temperature)
+    return -squares / temperature

@@ -1,6 +1,6 @@
-"""Embedding (after Sermanet et al. 2018): no translation, a feature space in which views agree.
+"""Time-contrastive embedding (Sermanet et al. 2018): no translation, a feature space in which views agree.
 
-It is the model of the `tcn` baseline and of XIRL, whose rewards are distances in this space.
+It is the model of the `tcn` baseline, whose reward is a distance in this space.
 """
 
 from torch import Tensor, nn
@@ -12,14 +12,11 @@ _LEAK = 0.2
 
 
 class Embedding(nn.Module):
-    """Four convolutions and two connected layers: (N, 3, H, W) in [-1, 1] -> (N, D).
+    """Four convolutions and two connected layers: (N, 3, H, W) in [-1, 1] -> unit vectors (N, D)."""
 
-    Unit vectors, unless not ``normalized``.
-    """
-
-    def __init__(self, image_size: int, dimensions: int, normalized: bool = True):
+    def __init__(self, image_size: int, dimensions: int):
         super().__init__()
-        self.image_size, self.dimensions, self.normalized = image_size, dimensions, normalized
+        self.image_size, self.dimensions = image_size, dimensions
         layers: list[nn.Module] = []
         before, side = 3, image_size
         for channels in _CHANNELS:
@@ -33,5 +30,4 @@ class Embedding(nn.Module):
         self.layers = nn.Sequential(*layers, nn.Flatten(), *connected)
 
     def forward(self, frames: Tensor) -> Tensor:
-        embedded = self.layers(frames).float()
-        return F.normalize(embedded, dim=-1) if self.normalized else embedded
+        return F.normalize(self.layers(frames).float(), dim=-1)

@@ -12,8 +12,6 @@ _LARGEST = 1024  # pixels and dimensions
 def save_embedding(folder: Path, model: Embedding, meta: dict[str, Any]) -> None:
     """Write the weights and a description: image size, dimensions and ``meta`` (JSON-serialisable)."""
     description = {"image_size": model.image_size, "dimensions": model.dimensions, **meta}
-    if not model.normalized:
-        description["normalized"] = False
     write_model(folder, model.state_dict(), description)
 
 
@@ -23,6 +21,6 @@ def load_embedding(folder: Path) -> Embedding:
     Raises AnyviewError if a file is missing, damaged or does not fit the other.
     """
     meta = read_description(folder, {"image_size": _LARGEST, "dimensions": _LARGEST})
-    model = Embedding(meta["image_size"], meta["dimensions"], meta.get("normalized") is not False)
+    model = Embedding(meta["image_size"], meta["dimensions"])
     read_weights(folder, model.load_state_dict)
     return model.eval().requires_grad_(False)

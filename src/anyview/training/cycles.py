@@ -69,7 +69,7 @@ class CycleObjective:
         """The first weights."""
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(torch_seed(self.seed, "cycles/weights"))
-            return Embedding(self.dataset.image_size, self.cell.dimensions, normalized=False)
+            return Embedding(self.dataset.image_size, self.cell.dimensions)
 
     def optimizer(self, parameters: list[nn.Parameter]) -> torch.optim.Optimizer:
         """Adam."""
