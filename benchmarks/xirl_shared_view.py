@@ -2,9 +2,9 @@
 
 One camera for all, no distractors; objects and the arm's starts are as diverse as ever, and with `goal` the
 goal is one, as in XIRL's own tasks. Agents' contexts are of the stream "tuning", never the evaluation's. The
-embedding, its training, learner and params are the pipeline's. Agents are rewarded by the distance to the last
-frame of one clip in their own context (`own`), or to the mean of 20 last frames in others (`others`), as
-`human-xirl` is. Beside the policies: the rewards of last frames whose object is off by some centimetres.
+embedding, its training, learner and params are the pipeline's. Agents are rewarded by the distance to the
+last frame of one clip in their own context (`own`), or to the mean of 20 last frames in others (`others`),
+as `human-xirl` is. Beside the policies: the rewards of last frames whose object is off by some centimetres.
 
 Usage: python benchmarks/xirl_shared_view.py [goal] [UPDATES]   (default: those of the cell)
 """
