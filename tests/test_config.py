@@ -283,6 +283,16 @@ def test_of_a_misspelt_key_the_wrong_name_is_said_and_not_the_right_one():
         parse_params(values)
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("cell", ["human", "human-xirl", "clips-5"])
+def test_what_a_method_beyond_depends_on_is_written_in_full(cell):
+    """Checkpoints are kept by what is written."""
+    params = parse_params(VALUES)
+    written = params.imitating(cell).model_dump()["imitation"]
+    assert written["cells"] == {cell: params.beyond.cells[cell].model_dump()}
+    assert written["demonstrations"] == VALUES["beyond"]["cells"][cell]["demonstrations"]
+
+
 def test_further_mistakes_are_counted():
     values = changed(("base", "seed"), -1)
     values["imitation"]["runs"] = 0

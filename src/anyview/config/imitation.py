@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal, NamedTuple
 
-from pydantic import Field, model_validator
+from pydantic import Field, SerializeAsAny, model_validator
 
 from anyview.config.values import (
     Block,
@@ -157,7 +157,8 @@ class Imitation(Block):
     )
     ddpg: DDPG
     trpo: TRPO
-    cells: dict[Name, Annotated[ImitationCell, Field(discriminator="reward")]]
+    # As what they are: those of `beyond` take their place in `Params.imitating`.
+    cells: SerializeAsAny[dict[Name, Annotated[ImitationCell, Field(discriminator="reward")]]]
 
 
 class AdversarialCell(MethodCell):
