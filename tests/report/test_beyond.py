@@ -71,6 +71,7 @@ def test_tables_tell_of_every_cell(beyond, params):
     assert rows["| `clips-5`"].split(" | ")[1:3] == ["5", "all"]
     assert rows["| `clips-every-4`"].split(" | ")[1:3] == ["20", "1 in 4"]
     assert rows["| `clips-two-thirds`"].split(" | ")[1:3] == ["20", "first 67%"]
+    assert any(row.startswith("| A hand's clips, XIRL") for table in tables for row in table)
     metrics = json.loads((beyond / "metrics/beyond.json").read_text())
     told = {cell for part in ("choice", "clips", "imitation", "tasks") for cell in metrics[part]}
     assert told == {*params.beyond.cells, "ours"}

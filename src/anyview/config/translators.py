@@ -15,7 +15,7 @@ class LossWeights(Block):
     alignment: NonNegative
     places: NonNegative = Field(
         default=0.0,
-        description="of keypoints away from marks: for the architecture `keypoint`, on clips with marks",
+        description="of keypoints away from marks: for `keypoint` and `keypoint-relative`, on clips with marks",
     )
 
     @model_validator(mode="after")
@@ -39,7 +39,7 @@ class TranslatorCell(WithExperts):
     """Stage `train`: one context translator."""
 
     dataset: str = Field(description="set of clips to learn from")
-    architecture: Literal["real", "sim", "compact", "keypoint"]
+    architecture: Literal["real", "sim", "compact", "keypoint", "keypoint-relative"]
     optimizer: Literal["adam", "adadelta"]
     iterations: Count
     weights: LossWeights
