@@ -15,7 +15,7 @@ class LossWeights(Block):
     alignment: NonNegative
     places: NonNegative = Field(
         default=0.0,
-        description="of keypoints away from marks: for `keypoint` and `keypoint-relative`, on clips with marks",
+        description="of keypoints away from marks: `keypoint` and `keypoint-relative`, on clips with marks",
     )
 
     @model_validator(mode="after")
