@@ -34,7 +34,7 @@ beyond: .setup-stamp .setup-stamp-graphics ## run what goes beyond the thesis as
 	dvc repro check simulate@diverse split@diverse split@real split@rendered train@sim imitate@ours
 	cd beyond && dvc repro
 
-evidence: .setup-stamp .setup-stamp-graphics ## figure 20 with six translators of each loss: hours, see evidence/dvc.yaml
+evidence: .setup-stamp .setup-stamp-graphics ## several models of each kind, three questions: hours, see docs/scaling.md
 	dvc repro check simulate@diverse split@diverse
 	cd evidence && dvc repro && python report.py
 

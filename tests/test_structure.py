@@ -8,6 +8,7 @@ import sys
 import tomllib
 from collections.abc import Iterator
 from functools import cache
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,7 @@ from dvc.dependency.param import ParamsDependency
 from dvc.repo import Repo
 
 from anyview.config import load_params
+from anyview.paths import CLUTTER, EVALUATIONS
 from anyview.pusher.task import task_names
 
 ROOT = Path(__file__).parents[1]
@@ -152,8 +154,8 @@ def covers(dependency: str, file: str) -> bool:
 
 SCRIPTS = [
     *((path, ROOT) for path in STAGES),
-    *((EVIDENCE / f"{name}.py", EVIDENCE) for name in ("train", "imitate")),
     *((BEYOND / f"{name}.py", BEYOND) for name in ("train", "embed")),
+    *((path, EVIDENCE) for path in sorted(EVIDENCE.glob("*/*.py"))),
     *(
         (BEYOND / "stages" / f"{name}.py", BEYOND)
         for name in ("simulate", "split", "translate", "imitate", "report")
@@ -177,7 +179,9 @@ def test_a_stage_depends_on_the_code_that_it_runs(script, folder):
     }
     own = str(script.relative_to(folder))
     reached = {own if file == str(script.relative_to(ROOT)) else file for file in reached}
-    cells = code_of(script.stem, folder)
+    # In evidence/ each part has a folder of scripts.
+    stage = f"{script.parent.name}-{script.stem}" if folder == EVIDENCE else script.stem
+    cells = code_of(stage, folder)
     together = set().union(*cells.values())
     if folder == BEYOND and script.stem == "imitate":
         reached -= {"src/anyview/learners/trpo.py"}  # no cell has it
@@ -226,9 +230,30 @@ def test_every_stage_has_a_script_and_every_script_a_stage():
 def test_the_study_knows_nothing_of_the_evidence_and_this_plans_every_seed():
     assert not any("-seed-" in out for _, outs in declared().values() for out in outs)
     evidence = load_params(ROOT / "params.yaml").evidence
-    models = {f"{name}-seed-{seed}" for name in evidence.translators for seed in evidence.seeds}
-    outputs = {f"data/models/{model}" for model in models}
-    outputs |= {f"data/policies/{model}-{reward}" for model in models for reward in evidence.rewards}
+    losses, diversity, headline = evidence.losses, evidence.diversity, evidence.headline
+    policies = {
+        f"{name}-seed-{seed}-{reward}"
+        for name, seed, reward in product(losses.translators, losses.seeds, losses.rewards)
+    }
+    policies |= {
+        f"{name}-seed-{seed}-{reward}"
+        for name, seed, reward in product(losses.translators, losses.others.seeds, losses.others.rewards)
+    }
+    sets = {f"views-{views}-{clutter}" for views, clutter in product(diversity.views, CLUTTER)}
+    policies |= {
+        f"{name}-{count}-seed-{seed}-{evaluation}"
+        for name, count, seed, evaluation in product(
+            sets, diversity.demonstrations, diversity.seeds, EVALUATIONS
+        )
+    }
+    models = {policy.rsplit("-", 1)[0] for policy in policies}
+    for cells, trained in (
+        (policies, headline.cells),
+        (models, [headline.translator, headline.embedding]),
+    ):
+        cells |= {f"headline-{name}-seed-{seed}" for name, seed in product(trained, headline.seeds)}
+    outputs = {f"data/models/{model}" for model in models} | {f"data/policies/{name}" for name in policies}
+    outputs |= {f"data/clips/{name}" for name in sets} | {f"data/splits/{name}.csv" for name in sets}
     assert set().union(*(outs for _, outs in declared(EVIDENCE).values())) == outputs
 
 

@@ -10,6 +10,10 @@ BEYOND = DATA / "beyond"  # the report on what goes beyond the thesis
 REAL = "real"  # the set of clips that ingest makes
 RENDERED = "rendered"  # the set that stage render makes; the others are simulated
 
+ANY_VIEW = "any"  # of the sets that evidence restricts: seen from anywhere, as the set that they show
+CLUTTER = ("plain", "distractors")
+EVALUATIONS = ("own", "contexts", "diverse")  # of their translators: see evidence/dvc.yaml
+
 
 def raw(source: str) -> Path:
     """Video files as a camera left them: ``surrogate`` or ``recorded``."""
@@ -41,6 +45,16 @@ def policies(cell: str) -> Path:
     return DATA / "policies" / cell
 
 
-def replicate(translator: str, seed: int, reward: str = "") -> str:
-    """Name of one of several trainings of a translator, and of its policies under a ``reward``."""
-    return f"{translator}-seed-{seed}" + (f"-{reward}" if reward else "")
+def replicate(translator: str, seed: int, policies: str = "") -> str:
+    """Name of one of several trainings of a translator, and of its ``policies``, of which there are kinds."""
+    return f"{translator}-seed-{seed}" + (f"-{policies}" if policies else "")
+
+
+def restricted_set(views: str, clutter: str) -> str:
+    """Name of the set of clips from so many ``views``, or ``ANY_VIEW``, with or without distractors."""
+    return f"views-{views}-{clutter}"
+
+
+def headline(cell: str) -> str:
+    """Name of a cell whose seeds are compared at full budget, before ``replicate`` adds its seed."""
+    return f"headline-{cell}"

@@ -7,9 +7,8 @@ from scipy import stats
 
 from anyview import paths
 from anyview.analysis.estimates import Estimator
-from anyview.analysis.replicates import ablations, learning, rates, read_replicates
+from anyview.analysis.replicates import BUDGETS, ablations, claims, learning, rates, read_replicates, verdicts
 from anyview.analysis.statistics import holm
-from anyview.runtime.errors import AnyviewError
 
 SEEDS, CONTEXTS = 6, 15
 ESTIMATOR = Estimator(1)
@@ -90,7 +89,9 @@ def test_the_contrasts_of_both_rewards_are_corrected_together():
 
 def test_few_translators_carry_no_claim():
     runs = runs_of({"ours": lucky(0.01, 0.0, count=3), "no-alignment": lucky(0.5, 0.0, count=3)})
-    assert list(ablations(runs, ESTIMATOR)["claim"]) == ["few"]
+    (row,) = ablations(runs, ESTIMATOR).itertuples()
+    assert row.claim == "few"
+    assert np.isnan(row.p)  # so that it takes nothing from the others' tests
 
 
 def test_rates_count_over_translators_and_contexts():
@@ -120,20 +121,39 @@ def test_one_translator_is_drawn_every_time():
 
 
 def test_only_what_has_all_of_its_seeds_is_read(data, params):
-    evidence = params.evidence
+    evidence = params.evidence.losses
     for seed in evidence.seeds:
         data.policies(paths.replicate("sim", seed, "raw"), 0.03)
         data.policies(paths.replicate("sim-no-alignment", seed, "raw"), 0.3)
     data.policies(paths.replicate("sim", 1, "normalised"), 0.03)
+    for seed in evidence.others.seeds:
+        data.policies(paths.replicate("sim", seed, "raw-tenth"), 0.03)
     runs, curves = read_replicates(params, data.root)
-    assert set(zip(runs["reward"], runs["cell"], strict=True)) == {("raw", "ours"), ("raw", "no-alignment")}
-    assert sorted(runs["seed"].unique()) == evidence.seeds
-    assert len(runs) == 2 * len(evidence.seeds) * 15
+    assert runs.groupby(["reward", "cell"])["seed"].unique().map(list).to_dict() == {
+        ("raw", "ours"): evidence.seeds,
+        ("raw", "no-alignment"): evidence.seeds,
+        ("raw-tenth", "ours"): evidence.others.seeds,
+    }
+    assert len(runs) == 15 * (2 * len(evidence.seeds) + len(evidence.others.seeds))
     table = learning(curves, 49)
     assert set(table["steps"]) == {49 * iteration for iteration in curves["iteration"]}
     assert (table.groupby("cell")["final_distance"].last().loc[["ours", "no-alignment"]] > 0.001).all()
 
 
-def test_nothing_to_read_is_said_so(params, tmp_path):
-    with pytest.raises(AnyviewError, match="no translator is evaluated with all of its seeds yet"):
-        read_replicates(params, tmp_path)
+def test_a_claim_is_judged_after_each_budget_by_the_curves():
+    """Without the loss policies are as good at first, and stay behind."""
+    cells = {"ours": lucky(0.01, 0.2), "no-translation": lucky(0.012, 0.2, 1)}
+    early = runs_of(cells | {"no-translation": lucky(0.01, 0.2)}).assign(iteration=10)
+    late = runs_of(cells | {"no-translation": lucky(0.1, 0.2, 1)}).assign(iteration=40)
+    table = claims(pd.concat([early, late]).drop(columns="success"), ESTIMATOR, 49)
+    assert list(table["steps"]) == [490, 1960]  # a quarter and a half are both the first point
+    assert len(BUDGETS) == 3
+    assert list(table["claim"]) == ["open", "supported"]
+    expected = ablations(late, ESTIMATOR)
+    assert table["p"].iloc[1] == expected["p"].iloc[0]
+    (row,) = verdicts(table).itertuples()
+    assert (row.cell, row.claims) == ("no-translation", ("open", "supported"))
+
+
+def test_where_nothing_was_run_there_are_no_runs(params, tmp_path):
+    assert all(table.empty for table in read_replicates(params, tmp_path))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from anyview.runtime.errors import AnyviewError, exit_code
+from anyview.runtime.errors import AnyviewError, choose_each, exit_code
 
 
 def raising(error: BaseException):
@@ -132,3 +132,17 @@ time.sleep(600)"""
     process.terminate()
     _, said = process.communicate(timeout=180)
     assert (process.returncode, said) == (130, "interrupted: run the same command again to continue\n")
+
+
+def test_each_argument_is_one_of_its_own_choices():
+    choices = {"CELL": ["sim", "tcn"], "SEED": [1, 2]}
+    assert choose_each(["tcn", "2"], choices, "train.py") == ["tcn", "2"]
+    for arguments, said in (
+        ([], "usage: python train.py CELL, where CELL is one of sim, tcn"),
+        (["gail", "1"], "usage: python train.py CELL, where CELL is one of sim, tcn"),
+        (["sim"], "usage: python train.py CELL SEED, where SEED is one of 1, 2"),
+        (["sim", "1", "2"], "usage: python train.py CELL SEED, where SEED is one of 1, 2"),
+    ):
+        with pytest.raises(AnyviewError) as caught:
+            choose_each(arguments, choices, "train.py")
+        assert str(caught.value) == said

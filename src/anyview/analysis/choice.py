@@ -5,13 +5,12 @@ from collections.abc import Iterator
 import pandas as pd
 
 from anyview.analysis.cells import in_order
-from anyview.analysis.comparisons import Methods
+from anyview.analysis.comparisons import TOLERANCE, Methods
 from anyview.analysis.estimates import Estimate, Estimator, proportion, tidy, without_interval
 from anyview.analysis.statistics import mcnemar_exact
 from anyview.analysis.study import EvaluatedMethod
 
 CHOICE = "choice"
-TOLERANCE = 0.02  # metres: an object nearer than this is at a goal
 
 
 def choosing(methods: Methods) -> dict[str, EvaluatedMethod]:

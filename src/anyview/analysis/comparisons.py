@@ -13,6 +13,8 @@ from anyview.analysis.study import EvaluatedMethod
 ENOUGH_RUNS = 6
 """Fewer paired runs carry no claim: not even a sign-flip test of runs that all agree would reach 5%."""
 SIGNIFICANT = 0.05
+TOLERANCE = 0.02
+"""Metres: an object nearer than this is at the goal."""
 FLOOR = 0.001
 """Metres: two objects nearer to the goal than this are equally near."""
 

@@ -2,9 +2,10 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from anyview.config.data import DemonstrationSet, Real, Simulate, SplitSet
+from anyview.config.evidence import Evidence
 from anyview.config.imitation import (
     Adversarial,
     AdversarialCell,
@@ -13,10 +14,9 @@ from anyview.config.imitation import (
     EmbeddingRewardCell,
     GoalCell,
     Imitation,
-    RewardWeights,
 )
 from anyview.config.translators import Assessment, CycleCell, EmbeddingCell, Training, TranslatorCell
-from anyview.config.values import Block, Count, Name
+from anyview.config.values import Block, Name
 
 
 class Base(Block):
@@ -42,25 +42,6 @@ class Beyond(Block):
     translators: dict[Name, TranslatorCell]
     embeddings: dict[Name, CycleCell]
     cells: dict[Name, Annotated[BeyondCell | GoalCell, Field(discriminator="reward")]]
-
-
-class Evidence(Block):
-    """Pipeline `evidence`: the translators of figure 20, each trained several times, as models of `ours`."""
-
-    translators: list[str] = Field(
-        min_length=2, description="cells of `translators`; the first has every loss, the others lack some"
-    )
-    seeds: list[Annotated[int, Field(ge=0)]] = Field(
-        min_length=1, description="of the trainings, one of each translator for each seed"
-    )
-    iterations: Count = Field(description="of each training, instead of the cell's own")
-    rewards: dict[Name, RewardWeights] = Field(min_length=1)
-
-    @model_validator(mode="after")
-    def _all_different(self) -> "Evidence":
-        if any(len(set(names)) < len(names) for names in (self.translators, self.seeds)):
-            raise ValueError("a translator or a seed is listed twice")
-        return self
 
 
 class Params(Block):

@@ -53,7 +53,17 @@ def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
     for key, cell in params.imitation.cells.items():
         models_of = params.embeddings if cell.reward == "embedding" else params.translators
         yield f"imitation.cells.{key}.model", cell.model, models_of
-    yield from (("evidence.translators", name, params.translators) for name in params.evidence.translators)
+    losses, diversity, headline = params.evidence.losses, params.evidence.diversity, params.evidence.headline
+    yield from (("evidence.losses.translators", name, params.translators) for name in losses.translators)
+    yield "evidence.diversity.translator", diversity.translator, params.translators
+    yield "evidence.headline.translator", headline.translator, params.translators
+    yield "evidence.headline.embedding", headline.embedding, params.embeddings
+    for key, methods, model in (
+        ("translated", headline.translated, headline.translator),
+        ("embedded", headline.embedded, headline.embedding),
+    ):
+        having = [name for name, cell in params.imitation.cells.items() if cell.model == model]
+        yield from ((f"evidence.headline.{key}", name, having) for name in methods)
 
 
 def _refuse_clips_that_nobody_sees(params: Params, name: str) -> None:
@@ -80,11 +90,12 @@ def _refuse_pretraining_alone(params: Params, name: str) -> None:
                     f"{name}: {block}.{key}.pretraining.iterations: {before} must be below "
                     f"{block}.{key}.iterations, {all_of_them}, which counts them"
                 )
-    for key in params.evidence.translators:
+    evidence = params.evidence
+    for key in (*evidence.losses.translators, evidence.diversity.translator, evidence.headline.translator):
         if params.translators[key].pretraining.iterations:
             raise AnyviewError(
-                f"{name}: evidence.translators: {key} pretrains (translators.{key}.pretraining.iterations), "
-                "and those of the evidence do not"
+                f"{name}: evidence: translators.{key}.pretraining.iterations: no translator of the evidence "
+                "pretrains"
             )
 
 

@@ -1,7 +1,7 @@
 """What stages `imitate` and `discriminate` do: from a cell of params.yaml to the folder of its policies."""
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,10 +32,17 @@ from anyview.video.files import write_video
 RATE = 10.0  # frames a second
 
 
-def evaluate_method(name: str, params: Params, method: Method, sources: Sequence[Path]) -> None:
+def evaluate_method(
+    name: str,
+    params: Params,
+    method: Method,
+    sources: Sequence[Path],
+    change: Callable[[Context], Context] | None = None,
+) -> None:
     """Train and evaluate the policies of cell ``name`` into its folder; continues from its checkpoints.
 
-    ``sources`` are the folders that its reward is made from, beside the demonstrations.
+    ``sources`` are the folders that its reward is made from, beside the demonstrations. ``change`` makes of
+    each context the one to act in; the name has to tell which.
 
     - ``runs.csv``: a row for each run, and how it ended;
     - ``curve.csv``: the learning curve of each run;
@@ -48,7 +55,7 @@ def evaluate_method(name: str, params: Params, method: Method, sources: Sequence
     ``choice`` then, and ``demonstrations.csv`` has ``choice``.
     """
     own = params.methods[name].shown.own_clips
-    imitated = _imitated(name, params)
+    imitated = _imitated(name, params, change or (lambda context: context))
     numbers = groups_of(params.imitation.runs, params.imitation.group)
     values, files = _origin(name, params, sources)
     tasks: list[tuple[Any, ...]] = []
@@ -99,10 +106,14 @@ def draw_contexts(params: Params, name: str, count: int) -> list[Context]:
     return sample_contexts(rng, count, kind, task)[0]
 
 
-def _imitated(name: str, params: Params) -> list[tuple[Colour | None, list[Context], Clips]]:
+def _imitated(
+    name: str, params: Params, change: Callable[[Context], Context]
+) -> list[tuple[Colour | None, list[Context], Clips]]:
     """For each choice, or the only task: the contexts to act in and the clips that are imitated there."""
     cell = params.methods[name]
-    contexts = draw_contexts(params, cell.shown.contexts, params.imitation.runs)
+    contexts = [
+        change(context) for context in draw_contexts(params, cell.shown.contexts, params.imitation.runs)
+    ]
 
     def clips(choice: Colour | None = None) -> Clips:
         if cell.shown.own_clips:

@@ -4,7 +4,7 @@ import errno
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from types import FrameType
 from typing import NoReturn
@@ -29,6 +29,20 @@ def choose(arguments: list[str], choices: Iterable[str], usage: str) -> str:
     if len(arguments) != 1 or arguments[0] not in choices:
         raise AnyviewError(f"usage: {usage}, where {usage.split()[-1]} is one of {', '.join(choices)}")
     return arguments[0]
+
+
+def choose_each(arguments: list[str], choices: Mapping[str, Iterable[object]], script: str) -> list[str]:
+    """Arguments of the stage ``python script``, one of each of ``choices``, as ``choose`` does.
+
+    The keys are what the usage calls them.
+    """
+    usage, chosen = f"python {script}", []
+    for place, (name, known) in enumerate(choices.items()):
+        usage += f" {name}"
+        last = place == len(choices) - 1
+        given = arguments[place:] if last else arguments[place : place + 1]
+        chosen.append(choose(given, list(map(str, known)), usage))
+    return chosen
 
 
 def refuse_arguments(arguments: list[str], usage: str) -> None:

@@ -31,7 +31,7 @@ def success(rates: pd.DataFrame) -> Figure:
         axis.set_ylim(len(cells) - 0.4, -0.6)
         axis.grid(axis="y", visible=False)
         axis.set(xlim=(-2.5, 102.5), xlabel="runs that succeed (%), 95% over translators and contexts")
-        figure.legend(loc="outside upper right", ncols=len(rewards) + 1)
+        figure.legend(loc="outside upper right", ncols=3)
         return figure
 
 

@@ -1,0 +1,125 @@
+"""How much diversity: what was put in comes out, and a claim needs pairs of translators that agree."""
+
+from itertools import product
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from anyview.analysis.diversity import angles, effects, enough, nearest, rates
+from anyview.analysis.estimates import Estimator
+from anyview.analysis.statistics import holm
+
+ESTIMATOR = Estimator(1)
+LEVELS = {"views": ["1", "4", "any"], "clutter": ["plain", "distractors"], "demonstrations": ["250", "4000"]}
+CONTEXTS = 15
+
+
+def runs_of(metres, seeds=(1, 2), evaluation="diverse", noise: float = 0.2) -> pd.DataFrame:
+    """Runs of the whole design; ``metres(views, clutter, demonstrations)`` is where a cell ends."""
+    rng = np.random.default_rng(0)
+    luck = rng.normal(0, 0.4, CONTEXTS)
+    tables = []
+    for *factors, seed in product(*LEVELS.values(), seeds):
+        distance = metres(*factors) * np.exp(rng.normal(0, noise) + luck + rng.normal(0, noise, CONTEXTS))
+        keys = dict(zip(LEVELS, factors, strict=True)) | {"evaluation": evaluation, "seed": seed}
+        angle = np.linspace(0, {"1": 180, "4": 45, "any": 1}[factors[0]], CONTEXTS)
+        columns = {"run": range(CONTEXTS), "success": distance < 0.02, "final_distance": distance}
+        tables.append(pd.DataFrame(columns | {"angle": angle}).assign(**keys))
+    return pd.concat(tables, ignore_index=True)
+
+
+def by_views(views: str, clutter: str, demonstrations: str) -> float:
+    """Only the first step of viewpoints matters; with distractors it gets a little worse."""
+    return (0.3 if views == "1" else 0.02) * (1.5 if clutter == "distractors" else 1)
+
+
+def test_what_helps_harms_and_does_neither_is_told_apart():
+    table = effects(runs_of(by_views), LEVELS, ESTIMATOR).set_index(["factor", "after"])
+    assert table["claim"].to_dict() == {
+        ("views", "4"): "helps",
+        ("views", "any"): "open",
+        ("clutter", "distractors"): "harms",
+        ("demonstrations", "4000"): "open",
+    }
+    assert list(table["pairs"]) == [8, 8, 12, 12]
+    assert table["ratio"]["views", "4"] == pytest.approx(0.02 / 0.3, rel=0.3)
+    assert table["value"]["views", "4"] > 0
+    up_to = enough(table.reset_index()).set_index("factor")
+    assert up_to["level"].to_dict() == {"views": "4", "clutter": "", "demonstrations": ""}
+    assert up_to["settled"].all()
+
+
+def test_ratio_and_test_are_of_pairs_that_differ_in_one_factor_alone():
+    """Against loops and scipy's permutation test."""
+    runs = runs_of(by_views)
+    logs = runs.assign(log=np.log(runs["final_distance"].clip(lower=0.001)))
+    means = logs.groupby([*LEVELS, "seed"])["log"].mean()
+    table = effects(runs, LEVELS, ESTIMATOR)
+    plain = []
+    for row in table.itertuples():
+        others = [values for name, values in LEVELS.items() if name != row.factor]
+        differences = []
+        for *rest, seed in product(*others, (1, 2)):
+            place = list(LEVELS).index(row.factor)
+            at = [tuple([*rest[:place], level, *rest[place:], seed]) for level in (row.before, row.after)]
+            differences.append(means[at[1]] - means[at[0]])
+        assert row.ratio == pytest.approx(np.exp(np.mean(differences)))
+        test = stats.permutation_test(
+            (differences,), np.mean, permutation_type="samples", vectorized=True, n_resamples=np.inf
+        )
+        plain.append(test.pvalue)
+    np.testing.assert_allclose(table["p"], holm(np.array(plain)))
+
+
+def test_pairs_that_are_not_there_yet_are_left_out_and_few_carry_no_claim():
+    runs = runs_of(by_views, seeds=(1,))
+    table = effects(runs, LEVELS, ESTIMATOR).set_index(["factor", "after"])
+    assert table["claim"]["views", "4"] == "few"  # 4 pairs
+    runs = runs_of(by_views)
+    missing = (runs["views"] == "1") & (runs["clutter"] == "plain") & (runs["seed"] == 2)
+    table = effects(runs[~missing], LEVELS, ESTIMATOR).set_index(["factor", "after"])
+    assert list(table["pairs"]) == [6, 8, 10, 11]
+    alone = effects(runs[runs["views"] == "1"], LEVELS, ESTIMATOR)
+    assert set(alone["factor"]) == {"clutter", "demonstrations"}
+
+
+def test_a_translator_of_bad_luck_is_no_effect():
+    """One of eight is bad, with all of its runs: certain over runs, open over translators."""
+    runs = runs_of(lambda *factors: 0.02)
+    bad = (runs["views"] == "4") & (runs["clutter"] == "plain") & (runs["seed"] == 2)
+    runs.loc[bad & (runs["demonstrations"] == "250"), "final_distance"] *= 20
+    table = effects(runs, LEVELS, ESTIMATOR)
+    assert set(table["claim"]) == {"open"}
+
+
+def test_rates_are_over_translators_and_contexts():
+    runs = runs_of(by_views)
+    table = rates(runs, ESTIMATOR).set_index(list(LEVELS))
+    cell = runs[(runs["views"] == "1") & (runs["clutter"] == "plain") & (runs["demonstrations"] == "250")]
+    row = table.loc["1", "plain", "250"]
+    assert (row["translators"], row["contexts"]) == (2, CONTEXTS)
+    assert row["distance"] == pytest.approx(stats.gmean(cell["final_distance"].clip(lower=0.001)))
+    assert row["distance_low"] < row["distance"] < row["distance_high"]
+
+
+def test_the_nearest_view_is_found_across_the_seam():
+    rng = np.random.default_rng(0)
+    azimuths, views = rng.uniform(-np.pi, np.pi, 50), rng.uniform(-np.pi, np.pi, 7)
+    cosines = np.cos(azimuths)[:, None] * np.cos(views) + np.sin(azimuths)[:, None] * np.sin(views)
+    np.testing.assert_allclose(nearest(azimuths, views), np.degrees(np.arccos(cosines.max(1))), atol=1e-5)
+    assert nearest(np.array([3.1]), np.array([-3.1])) == pytest.approx(np.degrees(2 * np.pi - 6.2))
+
+
+def test_classes_of_angles_hold_every_run_once():
+    runs = runs_of(by_views)
+    table = angles(runs)
+    assert table["runs"].sum() == len(runs)
+    assert list(dict.fromkeys(table["views"])) == ["1", "4", "any"]
+    for row in table.itertuples():
+        inside = runs[(runs["views"] == row.views) & (runs["angle"] <= row.most)]
+        inside = inside[(inside["angle"] > row.least) | ((row.least == 0) & (inside["angle"] == 0))]
+        assert row.runs == len(inside)
+        assert row.success == pytest.approx(inside["success"].mean())
+        assert row.distance == pytest.approx(stats.gmean(inside["final_distance"].clip(lower=0.001)))
