@@ -19,9 +19,11 @@ from anyview.translator.keypoints import (
     KEYPOINTS,
     KeypointTranslator,
     RelativeKeypointTranslator,
+    _carry,
     _strokes,
     place_loss,
     relative_places,
+    with_places,
 )
 from anyview.translator.losses import Marks
 from anyview.translator.weights import load_translator
@@ -73,6 +75,42 @@ def test_strokes_are_gaussians_around_places_and_lines(places):
     for points, stroke in zip([*places[0][:, None], *lines], made, strict=True):
         gap = np.linalg.norm(pixels[:, :, None] - points, axis=-1).min(axis=-1) * 6  # in pixels of the map
         np.testing.assert_allclose(stroke, np.exp(-(gap**2) / 2), atol=0.01)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.tuples(st.integers(-3, 3), st.integers(-3, 3)), st.integers(0, 3))
+def test_the_first_frame_is_shifted_with_the_object_and_turned_with_tool_and_arm(step, quarters):
+    """Against pixels moved one by one: whole steps, and quarter turns about a pixel's centre."""
+    first = frames(1)
+    before = np.zeros((1, KEYPOINTS, 2), int)  # pixels
+    before[0, [0, 2, 3, 4]] = [(8, 7), (8, 7), (8, 10), (11, 10)]  # object; tool, wrist and elbow
+    turn = np.linalg.matrix_power(np.array([[0, -1], [1, 0]]), quarters)
+    now = before.copy()
+    now[0, [0, 2]] += step
+    for joint, end in ((3, 2), (4, 3)):  # each line turns, from the tool on
+        now[0, joint] = now[0, end] + turn @ (before[0, joint] - before[0, end])
+    shifted, *turned = _carry(first, *(torch.from_numpy((2 * at + 1) / 16 - 1) for at in (before, now)))[0]
+    for picture, point, rotation in (
+        (shifted, 0, np.eye(2, dtype=int)),
+        (turned[0], 2, turn),
+        (turned[1], 3, turn),
+    ):
+        for x, y in np.ndindex(16, 16):
+            source = before[0, point] + rotation.T @ ((x, y) - now[0, point])
+            if ((source >= 0) & (source < 16)).all():
+                wanted = first[0, :, source[1], source[0]]
+                torch.testing.assert_close(picture[:, y, x], wanted, atol=1e-4, rtol=0)
+
+
+def test_dec_draws_at_marks_where_they_are_known(model):
+    codes = torch.linspace(-0.5, 0.5, 2 * model.width).reshape(2, -1)
+    marks = torch.tensor([[[0.25, -0.5], [torch.nan, torch.nan]], [[3.0, 0.0], [0.5, 0.25]]])
+    placed = with_places(codes, marks)
+    assert placed[:, :4].tolist() == [
+        [0.25, -0.5, *codes[0, 2:4].tolist()],
+        [pytest.approx(1.1), 0.0, 0.5, 0.25],  # far outside counts as just outside
+    ]
+    assert torch.equal(placed[:, 4:], codes[:, 4:])
 
 
 @settings(max_examples=30, deadline=None)

@@ -1,10 +1,12 @@
 """A translator whose code is a list of places: where things are, not what the whole picture is like.
 
-Enc finds keypoints: the mean places under softmaxes over maps (Finn et al. 2016), with what the thing there
-looks like. T tells from the expert's keypoints, now and in the first frame, where those of the target's first
-frame go. Dec draws that: it carries each keypoint's look to its new place as a Gaussian (Jakab et al. 2018,
-Kulkarni et al. 2019), with lines from each to the next along which limbs and tools are drawn, and blends all
-this into the target's first frame by a mask (Ebert et al. 2017), so that whatever stands still is copied.
+Enc finds keypoints: the mean places under softmaxes over maps (Finn et al. 2016), with what is seen there and
+along the lines from each to the next. T tells from the expert's keypoints, now and in the first frame, where
+those of the target's first frame go, and takes from the expert what an arm looks like. Dec draws that in
+layers that masks blend (Ebert et al. 2017): the target's first frame, so that whatever stands still is
+copied; the same carried along by the object, the tool and the forearm (Siarohin et al. 2019), so that these
+stay as sharp as they were; the colour of each keypoint and line; for the rest what a network draws from
+Gaussians at the keypoints (Jakab et al. 2018, Kulkarni et al. 2019) and along the lines.
 
 Same methods as those of ``network.ContextTranslator``, with one encoder for the expert and for the context.
 """
@@ -20,14 +22,18 @@ from anyview.runtime.errors import AnyviewError
 from anyview.translator.network import activate
 
 KEYPOINTS = 8
+_STROKES = 2 * KEYPOINTS - 1  # the keypoints, and the lines from each to the next
 _VECTOR = 32  # entries of a code beside the places, for what these do not say
-_LOOK = 8  # entries that describe what is seen at a keypoint
+_LOOK = 8  # entries that describe what is seen at a stroke, of which the first three are its colour
 _CHANNELS = 16, 32, 64  # of the maps at a half, a quarter and an eighth of the frame's side
 _HIDDEN = 256
 _STRIDE = 8
 _OUTSIDE = 1.1  # where what is outside of the picture counts as being
 _LEAST_WAY = 0.1  # between two keypoints, so that the same place twice is no division by nothing
-_COPIED = 2.0  # subtracted from the mask, so that at first most is copied
+_COPIED = 5.0  # added to the mask of what stands still, so that at first most is copied
+_SHIFTING = [0]  # keypoints that carry the first frame along: the object, see video/marks.py
+_TURNING = [2, 3]  # those from which lines do: from the tool to the wrist, and on to the elbow
+_SHORT = 0.05  # a line shorter than that has no direction
 _SIGMA = 1.0  # of a Gaussian, in pixels of the finest map
 
 
@@ -35,11 +41,10 @@ class Seen(NamedTuple):
     """What the encoder makes of frames (N, 3, H, W)."""
 
     code: Tensor
-    """(N, 2 K + V): x and y of each keypoint, -1 to 1 from edge to edge, then a vector."""
+    """(N, 2 K + V + 8 S): x and y of the keypoints, -1 to 1 from edge to edge; a vector; the looks of the
+    strokes, which are the keypoints and the lines from each to the next."""
     map: Tensor
     """(N, 16, H/2, W/2)."""
-    looks: Tensor
-    """(N, K, 8), of what is at the keypoints."""
 
 
 class KeypointEncoder(nn.Module):
@@ -57,7 +62,7 @@ class KeypointEncoder(nn.Module):
         self.up = nn.ModuleList([nn.Conv2d(coarse, middle, 1), nn.Conv2d(middle, fine, 1)])
         self.smooth = nn.ModuleList([_layer(middle, middle, 3), _layer(fine, fine, 3)])
         self.heat = nn.Conv2d(fine, KEYPOINTS, 1)
-        self.look = nn.Conv2d(fine, _LOOK, 1)
+        self.look = nn.Conv2d(fine, _LOOK - 3, 1)
         self.vector = nn.Linear(coarse, _VECTOR)
 
     def forward(self, frames: Tensor) -> Seen:
@@ -71,8 +76,10 @@ class KeypointEncoder(nn.Module):
         where = heat.unflatten(2, x.shape[2:])
         axis = _axis(x)
         places = torch.stack(((where.sum(2) * axis).sum(-1), (where.sum(3) * axis).sum(-1)), -1)
-        looks = heat @ self.look(x).flatten(2).transpose(1, 2)
-        return Seen(torch.cat((places.flatten(1), self.vector(pooled)), 1), x, looks)
+        strokes = _strokes(places.detach(), x).flatten(2)
+        seen = torch.cat((F.avg_pool2d(frames, 2), self.look(x)), 1)
+        looks = F.normalize(strokes, p=1, dim=-1, eps=1.0) @ seen.flatten(2).transpose(1, 2).float()
+        return Seen(torch.cat((places.flatten(1), self.vector(pooled), looks.flatten(1)), 1), x)
 
     def _shrink(self, x: Tensor) -> list[Tensor]:
         maps = []
@@ -112,8 +119,8 @@ class KeypointTranslation(nn.Module):
         for layer in self.hidden:
             x = activate(layer(x))
         mixed = self.weights(x).unflatten(1, (KEYPOINTS, KEYPOINTS)) @ _places(z2)
-        vector = z2[:, 2 * KEYPOINTS :]
-        return z2 + self.steps(x) + torch.cat((mixed.flatten(1), torch.zeros_like(vector)), 1)
+        places, rest = z2[:, : 2 * KEYPOINTS], z1[:, 2 * KEYPOINTS :]
+        return self.steps(x) + torch.cat((places + mixed.flatten(1), rest), 1)
 
 
 class DrawingTerms(NamedTuple):
@@ -124,19 +131,22 @@ class DrawingTerms(NamedTuple):
     still: Tensor
     """The context's part of the finest map, (C, 32, H/2, W/2)."""
     tints: Tensor
-    """What a keypoint or a line adds to that map where it is drawn, (C, 32, 2 K - 1)."""
+    """What a stroke adds to that map where it is drawn, by its look in the first frame, (C, 32, S)."""
+    places: Tensor
+    """The keypoints of the first frames, (C, K, 2)."""
 
 
 class KeypointDecoder(nn.Module):
-    """Draws the keypoints of codes z (N, 2 K + V) into the contexts' first frames: (N, 3, H, W)."""
+    """Draws the keypoints of codes z (N, 2 K + V + 8 S) into the contexts' first frames: (N, 3, H, W)."""
 
     def __init__(self) -> None:
         super().__init__()
         fine, middle, coarse = _CHANNELS
         self.still = nn.Conv2d(fine, middle, 1)
-        self.drawn = nn.Parameter(torch.empty(2 * KEYPOINTS - 1, _LOOK + 1, middle))
-        self.erased = nn.Parameter(torch.empty(2 * KEYPOINTS - 1, _LOOK + 1, middle))
-        for weights in (self.drawn, self.erased):
+        self.drawn = nn.Parameter(torch.empty(_STROKES, _LOOK + 1, middle))
+        self.erased = nn.Parameter(torch.empty(_STROKES, _LOOK + 1, middle))
+        self.now = nn.Parameter(torch.empty(_STROKES, _LOOK, middle))
+        for weights in (self.drawn, self.erased, self.now):
             nn.init.normal_(weights, std=(_LOOK + 1) ** -0.5)
         self.down = nn.ModuleList([_layer(middle, middle, 3, 2), _layer(middle, coarse, 3, 2)])
         self.vector = nn.Linear(_VECTOR, coarse)
@@ -144,31 +154,40 @@ class KeypointDecoder(nn.Module):
         self.up = nn.ModuleList([_doubling(coarse, middle), _doubling(middle, middle)])
         self.smooth = nn.ModuleList([_layer(middle, middle, 3), _layer(middle, middle, 3)])
         self.last_up = _doubling(middle, fine)
-        self.output = nn.Conv2d(fine + 3, 4, 3, padding=1)
+        copies = 1 + len(_SHIFTING) + len(_TURNING)  # of the first frame: where it was, and carried along
+        self.output = nn.Conv2d(fine + 3 * copies, 3 + copies + 1 + _STROKES, 3, padding=1)
 
     def skip_terms(self, skips: list[Tensor]) -> DrawingTerms:
         """What ``forward`` needs of what ``KeypointTranslator.encode_context`` returns beside z2."""
-        first, code, finest, looks = skips
-        known = torch.cat((looks, 0.5 * (looks[:, 1:] + looks[:, :-1])), 1)  # of keypoints, then of lines
-        known = torch.cat((known, torch.ones_like(known[..., :1])), -1)
+        first, code, finest = skips
+        looks = _looks(code)
+        known = torch.cat((looks, torch.ones_like(looks[..., :1])), -1)
         drawn, erased = (torch.einsum("nka,kac->nck", known, w) for w in (self.drawn, self.erased))
         still = self.still(finest)
-        return DrawingTerms(first, still + _paint(erased, _strokes(_places(code), still)), drawn)
+        places = _places(code)
+        return DrawingTerms(first, still + _paint(erased, _strokes(places, still)), drawn, places)
 
     def forward(self, z: Tensor, terms: DrawingTerms, noise: Generator | None = None) -> Tensor:
         """``z`` (N, ...) in the ``terms`` of C contexts, row n modulo C; ``noise`` is not needed."""
-        first, still, tints = (
+        first, still, tints, before = (
             each if len(each) == len(z) else each.repeat(len(z) // len(each), *[1] * (each.ndim - 1))
             for each in terms
         )
+        tints = tints + torch.einsum("nka,kac->nck", _looks(z), self.now)
         finest = activate(still + _paint(tints, _strokes(_places(z), still)))
         middle = self.down[0](finest)
         x = self.down[1](middle)
-        x = self.deep(x + self.vector(z[:, 2 * KEYPOINTS :])[:, :, None, None])
+        x = self.deep(x + self.vector(_vector(z))[:, :, None, None])
         for skip, up, smooth in zip((middle, finest), self.up, self.smooth, strict=True):
             x = smooth(activate(up(x) + skip))
-        x = self.output(torch.cat((activate(self.last_up(x)), first), 1))
-        return torch.lerp(first, x[:, :3], torch.sigmoid(x[:, 3:] - _COPIED))
+        copies = torch.cat((first[:, None], _carry(first, before, _places(z))), 1)
+        x = self.output(torch.cat((activate(self.last_up(x)), copies.flatten(1, 2).to(x.dtype)), 1)).float()
+        masks = torch.cat((x[:, 3:4] + _COPIED, x[:, 4:]), 1).softmax(1)
+        layers = torch.cat((copies, x[:, None, :3]), 1)
+        flat = masks[:, layers.shape[1] :].flatten(2)
+        colours = _looks(z)[..., :3].float().transpose(1, 2)
+        layered = (layers * masks[:, : layers.shape[1], None]).sum(1)
+        return layered + (colours @ flat).unflatten(2, first.shape[2:])
 
 
 class KeypointTranslator(nn.Module):
@@ -178,7 +197,7 @@ class KeypointTranslator(nn.Module):
     """
 
     architecture = "keypoint"
-    width = 2 * KEYPOINTS + _VECTOR
+    width = 2 * KEYPOINTS + _VECTOR + _STROKES * _LOOK
     shared = True
     task_embedding = True
 
@@ -199,8 +218,8 @@ class KeypointTranslator(nn.Module):
 
     def encode_context(self, frames: Tensor, noise: Generator | None = None) -> tuple[Tensor, list[Tensor]]:
         """z2 (N, width) of first frames (N, 3, H, W), and what the decoder needs beside codes."""
-        code, finest, looks = self.encoder(frames)
-        return code, [frames, code, finest, looks]
+        code, finest = self.encoder(frames)
+        return code, [frames, code, finest]
 
     def task_frames(self, length: int) -> np.ndarray:
         """Steps of a clip of ``length`` frames whose code T is given beside the present one: the first."""
@@ -247,13 +266,20 @@ def relative_places(codes: Tensor, first: Tensor) -> Tensor:
 
 
 def place_loss(codes: Tensor, marks: Tensor) -> Tensor:
-    """Mean squared distance of the first M keypoints of ``codes`` (N, 2 K + V) from ``marks`` (N, M, 2).
+    """Mean squared distance of the first M keypoints of ``codes`` (N, ...) from ``marks`` (N, M, 2).
 
     Marks are in the keypoints' units. Those far outside of the picture count as just outside, and those that
     are NaN are not known: no keypoint pays for them.
     """
     gaps = _places(codes)[:, : marks.shape[1]].float() - marks.clamp(-_OUTSIDE, _OUTSIDE)
     return torch.where(marks.isnan(), 0.0, gaps).square().sum(-1).mean()
+
+
+def with_places(codes: Tensor, marks: Tensor) -> Tensor:
+    """``codes`` (N, ...) with their first M keypoints at ``marks`` (N, M, 2), where these are known."""
+    known = marks.clamp(-_OUTSIDE, _OUTSIDE).flatten(1).to(codes.dtype)
+    found, others = codes.split((known.shape[1], codes.shape[1] - known.shape[1]), 1)
+    return torch.cat((torch.where(known.isnan(), found, known), others), 1)
 
 
 def _layer(inputs: int, outputs: int, kernel: int, stride: int = 1) -> nn.Sequential:
@@ -270,8 +296,18 @@ def _doubling(inputs: int, outputs: int) -> nn.ConvTranspose2d:
 
 
 def _places(code: Tensor) -> Tensor:
-    """(N, K, 2) of codes (N, 2 K + V)."""
+    """(N, K, 2) of codes (N, 2 K + V + 8 S)."""
     return code[:, : 2 * KEYPOINTS].unflatten(1, (KEYPOINTS, 2))
+
+
+def _vector(code: Tensor) -> Tensor:
+    """(N, V) of codes (N, 2 K + V + 8 S)."""
+    return code[:, 2 * KEYPOINTS : 2 * KEYPOINTS + _VECTOR]
+
+
+def _looks(code: Tensor) -> Tensor:
+    """(N, S, 8) of codes (N, 2 K + V + 8 S)."""
+    return code[:, 2 * KEYPOINTS + _VECTOR :].unflatten(1, (_STROKES, _LOOK))
 
 
 def _axis(like: Tensor) -> Tensor:
@@ -280,16 +316,21 @@ def _axis(like: Tensor) -> Tensor:
     return (2 * torch.arange(side, device=like.device, dtype=torch.float32) + 1) / side - 1
 
 
+def _grid(like: Tensor) -> tuple[Tensor, Tensor]:
+    """x and y (H, W) of the pixels of square maps ``like``."""
+    axis = _axis(like)
+    x, y = torch.meshgrid(axis, axis, indexing="xy")
+    return x, y
+
+
 def _strokes(places: Tensor, like: Tensor) -> Tensor:
     """(N, 2 K - 1, H, W), on maps ``like``: Gaussians of height 1 around ``places`` (N, K, 2) and lines.
 
     There is a line from each keypoint to the next.
     """
-    axis = _axis(like)
-    grid = torch.stack(torch.meshgrid(axis, axis, indexing="xy")).flatten(1)  # (2, H W)
     with torch.autocast(like.device.type, enabled=False):  # differences of squares need all digits
-        squares = _squares(places.float(), grid)
-    return torch.exp(-0.5 * (0.5 * len(axis) / _SIGMA) ** 2 * squares).unflatten(2, like.shape[2:])
+        squares = _squares(places.float(), torch.stack(_grid(like)).flatten(1))
+    return torch.exp(-0.5 * (0.5 * like.shape[-1] / _SIGMA) ** 2 * squares).unflatten(2, like.shape[2:])
 
 
 def _squares(places: Tensor, grid: Tensor) -> Tensor:
@@ -301,6 +342,26 @@ def _squares(places: Tensor, grid: Tensor) -> Tensor:
     length = ways.square().sum(-1, keepdim=True)
     t = (along / length.clamp(min=1e-6)).clamp(0, 1)
     return torch.cat((squares, squares[:, :-1] - t * (2 * along - t * length)), 1)
+
+
+def _carry(first: Tensor, before: Tensor, now: Tensor) -> Tensor:
+    """First frames (N, 3, H, W) carried by keypoints from ``before`` to ``now`` (N, K, 2): (N, B, 3, H, W).
+
+    A keypoint shifts the picture. A line shifts it as its first end moves, and turns it as it turns itself.
+    """
+    before, now = before.float(), now.float()
+    ends = _SHIFTING + _TURNING
+    x, y = (axis - now[:, ends, i, None, None] for i, axis in enumerate(_grid(first)))  # (N, B, H, W)
+    old, new = (
+        F.normalize(places[:, 1:] - places[:, :-1], dim=-1, eps=_SHORT)[:, _TURNING]
+        for places in (before, now)
+    )
+    upright = torch.ones_like(before[:, _SHIFTING, 0])
+    cosine = torch.cat((upright, (old * new).sum(-1)), 1)[..., None, None]
+    sine = torch.cat((0 * upright, old[..., 1] * new[..., 0] - old[..., 0] * new[..., 1]), 1)[..., None, None]
+    sources = torch.stack((cosine * x - sine * y, sine * x + cosine * y), -1) + before[:, ends, None, None]
+    seen = F.grid_sample(first.float(), sources.flatten(1, 2), padding_mode="border", align_corners=False)
+    return seen.unflatten(2, (len(ends), first.shape[2])).transpose(1, 2)
 
 
 def _paint(tints: Tensor, strokes: Tensor) -> Tensor:

@@ -13,7 +13,7 @@ from torch.nn import functional as F
 
 from anyview.config import LossWeights
 from anyview.translator.architectures import Translator
-from anyview.translator.keypoints import KeypointTranslator, place_loss
+from anyview.translator.keypoints import KeypointTranslator, place_loss, with_places
 
 FRAME_SCALE = 100 / 2
 ALIGNMENT_SCALE = 1000
@@ -97,8 +97,9 @@ def batch_losses(
 
     Frames are in [-1, 1]. ``clip`` (N, K, 3, H, W) are ``task_frames`` of the expert's clips, if T is given a
     task embedding. With ``wanted`` only the losses whose weight is above 0 are computed; ``noise``
-    turns dropout on. With ``marks`` there is L_places, of a translator of keypoints. What the decoder makes
-    of the skips is computed once for both decodings.
+    turns dropout on. With ``marks`` there is L_places, of a translator of keypoints, and L_tr is of what it
+    draws at the places that are marked. What the decoder makes of the skips is computed once for both
+    decodings.
     """
     target = paired[len(context) :]
     z1, z_true = model.encode_expert(paired, noise).chunk(2)
@@ -112,16 +113,19 @@ def batch_losses(
     z3 = model.translate(z1, z2, task, noise)
     skip_terms = model.decoder.skip_terms(skips)
 
-    places = None
+    places, drawn = None, z3
     if marks is not None and isinstance(model, KeypointTranslator):
         found = place_loss(torch.cat((z1, z_true, z2)), torch.cat(marks))
-        places = PLACE_SCALE * (found + place_loss(z3, marks.paired[len(context) :]))
+        wanted_places = marks.paired[len(context) :]
+        places = PLACE_SCALE * (found + place_loss(z3, wanted_places))
+        # Dec learns to draw from the places that are right. Those found at first teach it to blur.
+        drawn = with_places(z3, wanted_places)
 
     def decoding_loss(z: Tensor) -> Tensor:
         return frame_loss(model.decoder(z, skip_terms, noise), target)
 
     return Losses(
-        decoding_loss(z3) if wanted is None or wanted.translation else None,
+        decoding_loss(drawn) if wanted is None or wanted.translation else None,
         decoding_loss(z_true) if wanted is None or wanted.reconstruction else None,
         alignment_loss(z3, z_true) if wanted is None or wanted.alignment else None,
         places if wanted is not None and wanted.places else None,
