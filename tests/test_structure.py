@@ -154,10 +154,11 @@ def covers(dependency: str, file: str) -> bool:
 
 SCRIPTS = [
     *((path, ROOT) for path in STAGES if path.stem != "rank"),
+    *((BEYOND / f"{name}.py", BEYOND) for name in ("train", "embed")),
     *((path, EVIDENCE) for path in sorted(EVIDENCE.glob("*/*.py"))),
     *(
         (BEYOND / "stages" / f"{name}.py", BEYOND)
-        for name in ("simulate", "split", "train", "translate", "imitate", "rank", "report")
+        for name in ("simulate", "split", "translate", "imitate", "rank", "report")
     ),
 ]
 
@@ -270,6 +271,7 @@ def test_cells_are_those_of_params():
         ("split", beyond.split),
         ("train", beyond.translators),
         ("translate", beyond.translators),
+        ("embed", beyond.embeddings),
         ("imitate", beyond.cells),
     ):
         assert cells[f"beyond {stage}"] == set(named)
@@ -302,7 +304,7 @@ def test_every_ranked_reward_is_ranked_again_when_its_cell_or_model_changes():
     ("folder", "unread", "from_the_study"),
     [
         (ROOT, {"data/clips/rendered", "data/splits/rendered.csv"}, set()),
-        (BEYOND, set(), {"data/policies/ours", "data/clips/real"}),
+        (BEYOND, {"data/models/xirl"}, {"data/policies/ours", "data/clips/real"}),
     ],
     ids=["study", "beyond"],
 )

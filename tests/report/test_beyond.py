@@ -111,6 +111,7 @@ def test_tables_tell_of_every_cell(beyond, params):
     assert [cell.split()[0] for cell in rows["| `gail`"]] == ["1", "87.5%", "100%", "75%", "–"]
     assert [cell.split()[0] for cell in rows["| `choice`"]] == ["1", "91.7%", "100%", "100%", "75%"]
     assert rows["| Nothing but the time"] == ["1", "0%", "0%", "0%", "0% |"]
+    assert any(row.startswith("| A hand's clips, XIRL") for table in tables for row in table)
     metrics = json.loads((beyond / "metrics/beyond.json").read_text())
     assert metrics["rewards"]["gail"].keys() == {
         f"{name}{end}" for name in ("value_order", "refused") for end in ("", "_low", "_high")

@@ -23,6 +23,7 @@ LABELS = {
     "angles": "Ours (one clip)",
     "choice-angles": "Choice (one clip)",
     "human": "A hand's clips (20)",
+    "human-xirl": "A hand's clips, XIRL",
     "reach": "Reach (20 clips)",
     "reach-oracle": "Reach, Oracle",
     "strike": "Strike (20 clips)",

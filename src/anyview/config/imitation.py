@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Annotated, Literal, NamedTuple
 
-from pydantic import Field, model_validator
+from pydantic import Field, SerializeAsAny, model_validator
 
 from anyview.config.values import (
     Block,
@@ -160,7 +160,8 @@ class Imitation(Block):
     )
     ddpg: DDPG
     trpo: TRPO
-    cells: dict[Name, Annotated[ImitationCell, Field(discriminator="reward")]]
+    # As what they are: those of `beyond` take their place in `Params.imitating`.
+    cells: SerializeAsAny[dict[Name, Annotated[ImitationCell, Field(discriminator="reward")]]]
 
 
 class AdversarialCell(MethodCell):
@@ -177,8 +178,8 @@ class Adversarial(Block):
     cells: dict[Name, AdversarialCell]
 
 
-class BeyondCell(WithExperts, DemonstrationCell):
-    """One method of the studies beyond the thesis, with the runs and learners of `imitation`."""
+class BeyondMethodCell(WithExperts, MethodCell):
+    """A method of the studies beyond the thesis, with the runs and learners of `imitation`."""
 
     dataset: str = Field(
         description="simulated set whose task is done; where its clips choose between two goals, every "
@@ -208,9 +209,21 @@ class BeyondCell(WithExperts, DemonstrationCell):
         return Shown(self.other_experts, self.own_clips, self.contexts, self.angles)
 
     @model_validator(mode="after")
-    def _angles_of_own_clips(self) -> "BeyondCell":
+    def _angles_of_own_clips(self) -> "BeyondMethodCell":
         if self.angles and not self.own_clips:
             raise ValueError("angles: chosen for each context's own camera, which needs own_clips")
         if len(set(self.angles)) < len(self.angles):
             raise ValueError("angles: one is listed twice")
         return self
+
+
+class BeyondCell(BeyondMethodCell, DemonstrationCell):
+    """One method of the studies beyond the thesis, with the runs and learners of `imitation`."""
+
+
+class GoalCell(BeyondMethodCell):
+    """One method rewarded by the distance to the demonstrations' last frames in an embedding: XIRL."""
+
+    learner: Literal["ddpg", "trpo"]
+    reward: Literal["goal"]
+    model: str = Field(description="the embedding: a cell of `beyond.embeddings`")

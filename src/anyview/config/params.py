@@ -1,6 +1,6 @@
 """The whole of ``params.yaml``."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -12,9 +12,10 @@ from anyview.config.imitation import (
     BeyondCell,
     DemonstrationCell,
     EmbeddingRewardCell,
+    GoalCell,
     Imitation,
 )
-from anyview.config.translators import Assessment, EmbeddingCell, Training, TranslatorCell
+from anyview.config.translators import Assessment, CycleCell, EmbeddingCell, Training, TranslatorCell
 from anyview.config.values import Block, Count, Name
 
 
@@ -48,7 +49,8 @@ class Beyond(Block):
     sets: dict[Name, DemonstrationSet]
     split: dict[Name, SplitSet]
     translators: dict[Name, TranslatorCell]
-    cells: dict[Name, BeyondCell]
+    embeddings: dict[Name, CycleCell]
+    cells: dict[Name, Annotated[BeyondCell | GoalCell, Field(discriminator="reward")]]
     ranking: Ranking
 
 
@@ -105,6 +107,6 @@ class Params(Block):
         return self.model_copy(update={"imitation": self.imitation.model_copy(update=changed)})
 
     @property
-    def methods(self) -> dict[str, DemonstrationCell | EmbeddingRewardCell | AdversarialCell]:
+    def methods(self) -> dict[str, DemonstrationCell | EmbeddingRewardCell | GoalCell | AdversarialCell]:
         """Every method of the thesis's study, by its cell's name."""
         return {**self.imitation.cells, **self.adversarial.cells}

@@ -16,6 +16,7 @@ from anyview.analysis.ranking import failures
 from anyview.analysis.study import EvaluatedMethod, SimulatedSet, Study
 from anyview.analysis.tasks import by_task
 from anyview.analysis.viewpoints import SUCCESS, angles
+from anyview.config import BeyondCell
 from anyview.report.figures import choice, clips
 from anyview.report.figures.style import to_svg
 from anyview.report.figures.viewpoints import angle_curves
@@ -160,7 +161,9 @@ def _clip_curves(study: Study, results: BeyondResults) -> list[tuple[str, dict[s
 
 def _frames_of(study: Study, cell: str) -> str:
     """Which frames of its clips a method has."""
-    incomplete = study.params.beyond.cells[cell].incomplete
+    method = study.params.beyond.cells[cell]
+    assert isinstance(method, BeyondCell)
+    incomplete = method.incomplete
     kept = "all" if incomplete.every == 1 else f"1 in {incomplete.every}"
     return kept if incomplete.until == 1 else f"first {incomplete.until:.0%}"
 

@@ -29,6 +29,7 @@ _CHANNELS = 16, 32, 64  # of the maps at a half, a quarter and an eighth of the 
 _HIDDEN = 256
 _STRIDE = 8
 _OUTSIDE = 1.1  # where what is outside of the picture counts as being
+_LEAST_WAY = 0.1  # between two keypoints, so that the same place twice is no division by nothing
 _COPIED = 5.0  # added to the mask of what stands still, so that at first most is copied
 _SHIFTING = [0]  # keypoints that carry the first frame along: the object, see video/marks.py
 _TURNING = [2, 3]  # those from which lines do: from the tool to the wrist, and on to the elbow
@@ -97,11 +98,16 @@ class KeypointTranslation(nn.Module):
 
     Each goes to a weighted sum of all their places, and a step beside it. So "half of the way from the object
     to the target" is one set of weights for all contexts and points of view.
+
+    If ``relative``, T is also told where the keypoints are on the way from the first to the second in the
+    first frames: "half of the way" is a quotient of distances, which layers learn slowly.
     """
 
-    def __init__(self, width: int):
+    def __init__(self, width: int, relative: bool = False):
         super().__init__()
-        self.hidden = nn.ModuleList([nn.Linear(3 * width, _HIDDEN), nn.Linear(_HIDDEN, _HIDDEN)])
+        self.relative = relative
+        inputs = 3 * (width + 2 * KEYPOINTS * relative)
+        self.hidden = nn.ModuleList([nn.Linear(inputs, _HIDDEN), nn.Linear(_HIDDEN, _HIDDEN)])
         self.weights = nn.Linear(_HIDDEN, KEYPOINTS**2)
         self.steps = nn.Linear(_HIDDEN, width)
         with torch.no_grad():  # at first all stay where they are
@@ -111,6 +117,9 @@ class KeypointTranslation(nn.Module):
 
     def forward(self, z1: Tensor, z2: Tensor, first: Tensor) -> Tensor:
         x = torch.cat((z1, z2, first), dim=1)
+        if self.relative:
+            on_way = [relative_places(*pair) for pair in ((z1, first), (first, first), (z2, z2))]
+            x = torch.cat((x, *on_way), dim=1)
         for layer in self.hidden:
             x = activate(layer(x))
         mixed = self.weights(x).unflatten(1, (KEYPOINTS, KEYPOINTS)) @ _places(z2)
@@ -241,6 +250,30 @@ class KeypointTranslator(nn.Module):
     def decode(self, z: Tensor, skips: list[Tensor]) -> Tensor:
         """Dec: frames (N, 3, H, W) of z (N, width) and skips of C contexts, row n in context n modulo C."""
         return self.decoder(z, self.decoder.skip_terms(skips))
+
+
+class RelativeKeypointTranslator(KeypointTranslator):
+    """The same, whose T is told relative places: its first two keypoints must be taught what they are."""
+
+    architecture = "keypoint-relative"
+
+    def __init__(self, image_size: int):
+        super().__init__(image_size)
+        self.translation = KeypointTranslation(self.width, relative=True)
+
+
+def relative_places(codes: Tensor, first: Tensor) -> Tensor:
+    """Places (N, 2 K) of ``codes`` along and beside the way from the first to the second of ``first``'s.
+
+    In units of that way: the same for all points of view from above, and for all sizes. Those more than three
+    ways off count as that far.
+    """
+    start, end = _places(first)[:, :2].split(1, dim=1)  # (N, 1, 2) each
+    way, offsets = end - start, _places(codes) - start
+    square = way.square().sum(-1).clamp_min(_LEAST_WAY**2)
+    along = (offsets * way).sum(-1) / square
+    beside = (way[..., 0] * offsets[..., 1] - way[..., 1] * offsets[..., 0]) / square
+    return torch.stack((along, beside), -1).flatten(1).clamp(-3, 3)
 
 
 def place_loss(codes: Tensor, marks: Tensor) -> Tensor:
