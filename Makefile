@@ -31,7 +31,7 @@ repro: .setup-stamp .setup-stamp-graphics ## run the whole pipeline; only what c
 	dvc repro
 
 beyond: .setup-stamp .setup-stamp-graphics ## run what goes beyond the thesis as well, and what it needs of the rest
-	dvc repro check simulate@diverse split@diverse split@real split@rendered train@sim imitate@ours
+	dvc repro check simulate@diverse split@diverse split@real split@rendered train@sim embed@tcn imitate@ours
 	cd beyond && dvc repro
 
 evidence: .setup-stamp .setup-stamp-graphics ## several models of each kind, three questions: hours, see docs/scaling.md

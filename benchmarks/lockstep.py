@@ -1,18 +1,14 @@
-"""Training in lockstep against Stable-Baselines3's DDPG, and where the time of a lockstep step goes.
+"""Where the time of a lockstep step of DDPG goes: one core, a group of 8 runs, each part beside its floor.
 
-- environment steps per second, updates included, summed over 15 runs: ours in two groups on two cores,
-  against Stable-Baselines3 training runs one after another, with one thread or all, whichever is faster. Both
-  have the same environment, translated reward, network, batch and number of updates;
-- one core's time in a lockstep step of a group of 8, each part beside its floor: acting, encoder and updates,
-  their matrix products at the rate of a large one; physics, MuJoCo's steps alone; rendering, a picture of
-  nothing (clear, read back, average); replay, its bytes at the rate of a large copy.
+Acting, encoder and updates: their matrix products at the rate of a large one. Physics: MuJoCo's steps alone.
+Rendering: a picture of nothing (clear, read back, average). Replay: its bytes at the rate of a large copy.
+`rivals.py` compares the whole with learners of others.
 
 The translator has random weights: its speed is that of a trained one. Run it on an idle machine.
 
 Usage: python benchmarks/lockstep.py
 """
 
-import os
 import time
 from collections.abc import Callable
 from contextlib import contextmanager
@@ -23,9 +19,6 @@ import numpy as np
 import torch
 
 from anyview.config import Params, load_params
-from anyview.environments.pusher import PusherEnv
-from anyview.environments.translated import TranslatedReward
-from anyview.evaluation.runs import groups_of
 from anyview.learners.common.replay import Replay
 from anyview.learners.ddpg import make_learner, minibatch_ages
 from anyview.pusher.batch import ACTION_SIZE, ACTIONS, PusherBatch, observation_size
@@ -35,12 +28,18 @@ from anyview.pusher.render import renderer
 from anyview.pusher.scene import SUBSTEPS
 from anyview.pusher.task import load_task
 from anyview.rewards.demonstration import DemonstrationReward, translate_demonstrations
-from anyview.runtime.workers import run_tasks
 from anyview.translator.network import ContextTranslator
 
 import mujoco.batch  # isort: skip  (after anyview.pusher, which chooses the OpenGL backend)
 
-RUNS, EPISODES, ROUNDS = 15, 4, 3
+RUNS, EPISODES = 8, 4
+
+
+def comparable_params() -> Params:
+    """The params, without what DDPG of others lacks, and with updates from the second episode on."""
+    params = load_params()
+    ddpg = params.imitation.ddpg.model_copy(update={"time_features": 0, "warmup_episodes": 1})
+    return params.model_copy(update={"imitation": params.imitation.model_copy(update={"ddpg": ddpg})})
 
 
 def make_translator(params: Params) -> ContextTranslator:
@@ -121,39 +120,6 @@ def replay_seconds(params: Params, runs: int) -> float:
     return seconds(replay_episode, 5)
 
 
-def lockstep_rate(params: Params, contexts: list[Context]) -> float:
-    """Steps per second of 15 runs in groups on two workers, setting up left out."""
-    os.environ["ANYVIEW_WORKERS"] = "2"
-    groups = groups_of(len(contexts), params.imitation.group)
-    tasks = [(params, group, [contexts[run] for run in group]) for group in groups]
-    return sum(steps / sum(watch.parts.values()) for steps, watch in run_tasks(train_group, tasks))
-
-
-def stable_baselines3_rate(params: Params, contexts: list[Context], threads: int) -> float:
-    """Steps per second of Stable-Baselines3's DDPG in one run: the rate of any number one after another."""
-    from stable_baselines3 import DDPG
-
-    torch.set_num_threads(threads)
-    clips = make_clips(params, contexts[:2])
-    pusher = PusherEnv(contexts[0], image_size=params.sim.image_size, render_mode="rgb_array")
-    cell = params.imitation.cells["ours"]
-    env = TranslatedReward(pusher, make_translator(params), clips, cell.weights, cell.time_power)
-    wanted = params.imitation.ddpg
-    model = DDPG(
-        "MlpPolicy",
-        env,
-        batch_size=wanted.batch_size,
-        gradient_steps=round(wanted.updates_per_step),
-        train_freq=1,
-        learning_starts=ACTIONS - 1,
-        policy_kwargs={"net_arch": list(wanted.hidden)},
-    )
-    model.learn(ACTIONS)
-    started = time.perf_counter()
-    model.learn(EPISODES * ACTIONS, reset_num_timesteps=False)
-    return EPISODES * ACTIONS / (time.perf_counter() - started)
-
-
 def seconds(work: Callable[[], object], repeats: int = 30) -> float:
     """Median time of ``work``."""
     times = []
@@ -187,7 +153,7 @@ def empty_picture(size: int) -> Callable[[], object]:
 
 
 def floors(params: Params) -> dict[str, float]:
-    """Least seconds of each part of a lockstep step of 8 runs, as the module's text defines them."""
+    """Least seconds of each part of a lockstep step, as the module's text defines them."""
     torch.set_num_threads(1)
     square, memory = torch.randn(512, 512), torch.zeros(1 << 24)
     rate = 2 * 512**3 / seconds(lambda: square @ square)
@@ -201,43 +167,28 @@ def floors(params: Params) -> dict[str, float]:
     widths = [observation_size("push", 1) + ACTION_SIZE + ddpg.time_features, *ddpg.hidden, 1]
     network = 2 * sum(a * b for a, b in pairwise(widths))
     row = 4 * (2 * observation_size("push", 1) + ACTION_SIZE + 2)
-    pushers = mujoco.batch.Batch(load_task("push").model("twist"), nsim=8, nthread=1)
+    pushers = mujoco.batch.Batch(load_task("push").model("twist"), nsim=RUNS, nthread=1)
     picture = empty_picture(2 * size)
     # Per update, in passes: targets 2, critic 3 (its backward counts 2), policy 3 and through the critic 2.
     return {
-        "acting": 8 * network / rate,
+        "acting": RUNS * network / rate,
         "physics": seconds(lambda: pushers.step(nstep=SUBSTEPS)),
-        "rendering": 8 * seconds(picture, 200),
-        "reward (encoder)": 8 * encoder / rate,
-        "replay": 8 * ddpg.updates_per_step * ddpg.batch_size * row / copying,
-        "updates": 8 * ddpg.updates_per_step * 10 * ddpg.batch_size * network / rate,
+        "rendering": RUNS * seconds(picture, 200),
+        "reward (encoder)": RUNS * encoder / rate,
+        "replay": RUNS * ddpg.updates_per_step * ddpg.batch_size * row / copying,
+        "updates": RUNS * ddpg.updates_per_step * 10 * ddpg.batch_size * network / rate,
     }
 
 
 def main() -> None:
-    """Print the comparison and the breakdown."""
-    params, cores = load_params(), len(os.sched_getaffinity(0))
-    ddpg = params.imitation.ddpg.model_copy(update={"time_features": 0, "warmup_episodes": 1})
-    imitation = params.imitation.model_copy(update={"ddpg": ddpg, "episodes_per_iteration": 1})
-    params = params.model_copy(update={"imitation": imitation})
+    """Print the breakdown."""
+    params = comparable_params()
     contexts, _ = sample_contexts(np.random.default_rng(0), RUNS)
-    pairs = []
-    for _ in range(ROUNDS):
-        theirs = [stable_baselines3_rate(params, contexts, threads) for threads in {1, cores}]
-        pairs.append((lockstep_rate(params, contexts), max(theirs)))
-    ours_rate, theirs_rate = np.median(pairs, axis=0)
-    ratios = [a / b for a, b in pairs]
-    print(
-        f"{RUNS} runs, {ddpg.updates_per_step:.0f} updates a step of batch {ddpg.batch_size}, "
-        f"{ddpg.hidden} units: lockstep {ours_rate:.0f} steps/s,\n"
-        f"Stable-Baselines3 {theirs_rate:.0f} steps/s: ratio {np.median(ratios):.1f} "
-        f"(from {min(ratios):.1f} to {max(ratios):.1f} over {ROUNDS} rounds)\n"
-    )
-    steps, watch = train_group(params, range(8), contexts[:8])
+    steps, watch = train_group(params, range(RUNS), contexts)
     lowest, whole = floors(params), sum(watch.parts.values())
-    print("a lockstep step of 8 runs on one core:")
+    print(f"a lockstep step of {RUNS} runs on one core:")
     for name, spent in sorted(watch.parts.items(), key=lambda part: -part[1]):
-        taken = f"{1000 * 8 * spent / steps:6.2f} ms {spent / whole:4.0%}"
+        taken = f"{1000 * RUNS * spent / steps:6.2f} ms {spent / whole:4.0%}"
         print(f"  {name:20} {taken}, floor {1000 * lowest[name]:.3f} ms")
 
 

@@ -73,6 +73,33 @@ def expert_frames(contexts: Sequence[Context]) -> Callable[[], int]:
     return work
 
 
+def plain_frames(contexts: Sequence[Context]) -> Callable[[], int]:
+    """The same by ``mujoco.Renderer``."""
+    positions = roll_out(contexts)[0][:, ACTIONS // 2]
+    scene = copy.copy(load_task(contexts[0].task).model("twist"))
+    default = mujoco.MjSpec().visual.quality
+    scene.vis.quality.numslices, scene.vis.quality.numstacks = default.numslices, default.numstacks
+    scene.vis.quality.numquads = default.numquads
+    data = mujoco.MjData(scene)
+    camera = mujoco.MjvCamera()
+    camera.lookat[:] = [*ARENA_CENTRE, 0.0]
+    camera.distance, camera.elevation = CAMERA_DISTANCE, CAMERA_ELEVATION
+    shoot = mujoco.Renderer(scene, 64, 64)
+    shoot.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
+
+    def work() -> int:
+        for _ in range(4):
+            for context, position in zip(contexts, positions, strict=True):
+                data.qpos[:] = position
+                mujoco.mj_forward(scene, data)
+                camera.azimuth = np.rad2deg(context.azimuth)
+                shoot.update_scene(data, camera)
+                shoot.render()
+        return 4 * len(contexts)
+
+    return work
+
+
 def compare_tasks() -> None:
     """Print what the other tasks cost, as multiples of what push costs."""
     contexts = {task: sample_contexts(np.random.default_rng(0), RUNS, task=task)[0] for task in task_names()}
@@ -95,33 +122,7 @@ def main() -> None:
     batch.reset()
     positions = batch.positions()
 
-    scene = copy.copy(load_task("push").model("twist"))
-    default = mujoco.MjSpec().visual.quality
-    scene.vis.quality.numslices, scene.vis.quality.numstacks = default.numslices, default.numstacks
-    scene.vis.quality.numquads = default.numquads
-    data = mujoco.MjData(scene)
-    camera = mujoco.MjvCamera()
-    camera.lookat[:] = [*ARENA_CENTRE, 0.0]
-    camera.distance, camera.elevation = CAMERA_DISTANCE, CAMERA_ELEVATION
-    shoot = mujoco.Renderer(scene, 64, 64)
-    shoot.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
-
-    def render_ours() -> int:
-        for _ in range(4):
-            renderer("push", 64).render(contexts, positions)
-        return 4 * RUNS
-
-    def render_plain() -> int:
-        for _ in range(4):
-            for context, position in zip(contexts, positions, strict=True):
-                data.qpos[:] = position
-                mujoco.mj_forward(scene, data)
-                camera.azimuth = np.rad2deg(context.azimuth)
-                shoot.update_scene(data, camera)
-                shoot.render()
-        return 4 * RUNS
-
-    compare("rendering, 64x64", render_ours, render_plain, "frames")
+    compare("rendering, 64x64", expert_frames(contexts), plain_frames(contexts), "frames")
 
     rng = np.random.default_rng(1)
     actions = rng.uniform(-1, 1, (STEPS, RUNS, 3))

@@ -63,10 +63,14 @@ class Data:
     def real_clips(self) -> None:
         folder = self._folder("clips", "real")
         clips = [f"clip-{index:03d}" for index in range(12)]
-        self._csv(folder / "manifest.csv", clip=clips, file=[f"{clip}.avi" for clip in clips])
+        pairs, cameras = [f"pair-{index // 2}" for index in range(12)], ["left", "right"] * 6
+        files = [f"{clip}.avi" for clip in clips]
+        self._csv(folder / "manifest.csv", clip=clips, file=files, pair=pairs, camera=cameras)
+        azimuths = [120.0, 5.0] * 6  # 115 degrees between the cameras
+        raw = self._folder("raw", "surrogate") / "manifest.csv"
+        self._csv(raw, file=files, pair=pairs, camera=cameras, azimuth=azimuths)
         self._csv(folder / "refused.csv", file=["dark.avi"], pair=["dark"], reason=["too dark"])
         places = ["train"] * 6 + ["validation"] * 4 + ["extreme"] * 2
-        pairs = [f"pair-{index // 2}" for index in range(12)]
         self._csv(self._folder("splits") / "real.csv", clip=clips, pair=pairs, split=places)
 
     def translator(self, cell: str, iterations: int = 520, extreme: bool = False, scale: float = 1.0) -> None:
@@ -80,7 +84,8 @@ class Data:
         clips = [f"clip-{index:03d}" for index in range(len(places))]
         hard = np.where(np.array(places) == "extreme", 2.7, 1.0) * scale
         pairs = [f"pair-{index // 2}" for index in range(len(places))]
-        rows = pd.DataFrame({"clip": clips, "pair": pairs, "split": places})
+        sources = [clips[index ^ 1] for index in range(len(clips))]
+        rows = pd.DataFrame({"clip": clips, "source": sources, "pair": pairs, "split": places})
         for name, size in (
             ("loss", 4_000),
             ("translation", 2_000),

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.slow
 def beyond(trunk, tmp_path_factory) -> Study:
     """The whole of beyond/ on top of the trunk."""
     study = trunk.copy(tmp_path_factory.mktemp("beyond"))
-    study.run("dvc", "repro", "split@real", "split@rendered")
+    study.run("dvc", "repro", "split@real", "split@rendered", "embed@tcn")
     study = Study(study.folder / "beyond", study.scratch)
     study.run("dvc", "repro")
     return study
@@ -41,7 +41,11 @@ def test_metrics_and_page_tell_of_every_cell(beyond):
 
 
 def test_a_robot_imitates_held_out_clips_of_a_hand(beyond):
-    shown = pd.read_csv(beyond.folder / "data/policies/human/demonstrations.csv")["clip"]
+    shown, theirs = (
+        pd.read_csv(beyond.folder / f"data/policies/{cell}/demonstrations.csv")["clip"]
+        for cell in ("human", "human-xirl")
+    )
+    assert list(shown) == list(theirs)
     split = pd.read_csv(beyond.folder / "data/splits/real.csv").set_index("clip")["split"]
     assert set(split[shown]) == {"validation"}
     translated = pd.read_csv(beyond.folder / "data/translations/sim-human/clips.csv")

@@ -115,9 +115,47 @@ def test_the_committed_params_are_sound():
             "beyond.cells.human.experts: other experts' clips are the same for every context, and no clock's",
         ),
         (
+            "beyond.translators.sim-human.dataset",
+            "reach",
+            "beyond.translators.sim-human.dataset: 'reach' is none of these: diverse, narrow, choice",
+        ),
+        (
+            "beyond.cells.human-xirl.model",
+            "sim",
+            "beyond.cells.human-xirl.model: 'sim' is none of these: xirl",
+        ),
+        ("beyond.cells.human-xirl.time_power", 1.0, "beyond.cells.human-xirl.time_power: unknown key"),
+        (
+            "beyond.cells.human-xirl.reward",
+            "nearest",
+            "beyond.cells.human-xirl.reward: Input should be 'translated', 'true', 'clock' or 'goal'",
+        ),
+        (
+            "beyond.embeddings.xirl.experts",
+            "rendered",
+            "beyond.embeddings.xirl.experts: 'rendered' is none of these: diverse, real",
+        ),
+        ("beyond.embeddings.xirl.clips", 5, "beyond.embeddings.xirl.clips: Input should be a multiple of 2"),
+        (
+            "beyond.embeddings.tcn",
+            VALUES["beyond"]["embeddings"]["xirl"],
+            "beyond.embeddings.tcn: the name is taken by translators or embeddings",
+        ),
+        (
             "beyond.sets.wide",
             {"task": "push", "contexts": "choice", "demos": 4},
             "beyond.split.wide: missing key",
+        ),
+        (
+            "beyond.cells.angles.own_clips",
+            False,
+            "beyond.cells.angles: angles: chosen for each context's own camera, which needs own_clips",
+        ),
+        ("beyond.cells.angles.angles", [30, 30], "beyond.cells.angles: angles: one is listed twice"),
+        (
+            "beyond.ranking.methods",
+            ["ours", "sim"],
+            "beyond.ranking.methods: 'sim' is none of these: ours, liu, narrow-ddpg",
         ),
         ("beyond.cells.clock.own_clips", True, "beyond.cells.clock: own_clips: a clock hears of no clip"),
         (
@@ -262,6 +300,16 @@ def test_of_a_misspelt_key_the_wrong_name_is_said_and_not_the_right_one():
         AnyviewError, match=r"imitation.cells.ours.weights.imgae: unknown key \(and 1 more\)$"
     ):
         parse_params(values)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("cell", ["human", "human-xirl", "clips-5"])
+def test_what_a_method_beyond_depends_on_is_written_in_full(cell):
+    """Checkpoints are kept by what is written."""
+    params = parse_params(VALUES)
+    written = params.imitating(cell).model_dump()["imitation"]
+    assert written["cells"] == {cell: params.beyond.cells[cell].model_dump()}
+    assert written["demonstrations"] == VALUES["beyond"]["cells"][cell]["demonstrations"]
 
 
 def test_further_mistakes_are_counted():

@@ -153,11 +153,12 @@ def covers(dependency: str, file: str) -> bool:
 
 
 SCRIPTS = [
-    *((path, ROOT) for path in STAGES),
+    *((path, ROOT) for path in STAGES if path.stem != "rank"),
+    *((BEYOND / f"{name}.py", BEYOND) for name in ("train", "embed")),
     *((path, EVIDENCE) for path in sorted(EVIDENCE.glob("*/*.py"))),
     *(
         (BEYOND / "stages" / f"{name}.py", BEYOND)
-        for name in ("simulate", "split", "train", "translate", "imitate", "report")
+        for name in ("simulate", "split", "translate", "imitate", "rank", "report")
     ),
 ]
 
@@ -223,7 +224,8 @@ def test_an_edit_reruns_no_more_than_it_must():
 
 
 def test_every_stage_has_a_script_and_every_script_a_stage():
-    assert {name.split("@")[0] for name in declared()} == {path.stem for path in STAGES}
+    stages = {name.split("@")[0] for folder in (ROOT, BEYOND) for name in declared(folder)}
+    assert stages == {path.stem for path in STAGES}
 
 
 def test_the_study_knows_nothing_of_the_evidence_and_this_plans_every_seed():
@@ -269,6 +271,7 @@ def test_cells_are_those_of_params():
         ("split", beyond.split),
         ("train", beyond.translators),
         ("translate", beyond.translators),
+        ("embed", beyond.embeddings),
         ("imitate", beyond.cells),
     ):
         assert cells[f"beyond {stage}"] == set(named)
@@ -280,11 +283,28 @@ def test_cells_are_those_of_params():
     assert cells["discriminate"] == set(params.adversarial.cells)
 
 
+def test_every_ranked_reward_is_ranked_again_when_its_cell_or_model_changes():
+    params = load_params(ROOT / "params.yaml")
+    methods = {**params.methods, **params.beyond.cells}
+    with Repo(str(BEYOND)) as repo:
+        (stage,) = (stage for stage in repo.index.stages if stage.name == "rank")
+        read = set().union(*(dep.params for dep in stage.deps if isinstance(dep, ParamsDependency)))
+    blocks = {name: f"imitation.cells.{name}" for name in params.imitation.cells}
+    blocks |= dict.fromkeys(params.adversarial.cells, "adversarial")
+    blocks |= {name: f"beyond.cells.{name}" for name in params.beyond.cells}
+    assert {f"imitation.{cell.learner}" for cell in params.adversarial.cells.values()} <= read
+    assert {blocks[name] for name in params.beyond.ranking.methods} <= read
+    models = {
+        methods[name].model for name in params.beyond.ranking.methods if name not in params.adversarial.cells
+    }
+    assert {f"data/models/{model}" for model in models} <= declared(BEYOND)["rank"][0]
+
+
 @pytest.mark.parametrize(
     ("folder", "unread", "from_the_study"),
     [
-        (ROOT, {"data/raw/surrogate", "data/clips/rendered", "data/splits/rendered.csv"}, set()),
-        (BEYOND, set(), {"data/policies/ours", "data/clips/real"}),
+        (ROOT, {"data/clips/rendered", "data/splits/rendered.csv"}, set()),
+        (BEYOND, {"data/models/xirl"}, {"data/policies/ours", "data/clips/real"}),
     ],
     ids=["study", "beyond"],
 )

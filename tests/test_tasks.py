@@ -17,15 +17,22 @@ from anyview.pusher.expert import roll_out
 from anyview.pusher.render import renderer
 from anyview.pusher.task import load_task, task_names
 from anyview.runtime.errors import AnyviewError
+from anyview.video.files import read_video
 from anyview.video.sets import open_frames
 
 
-def stage(root: Path, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run a stage's script in ``folder``, where modules can be imported from."""
+def run(root: Path, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run Python in ``folder``, where modules can be imported from."""
     path = f"{root / 'src'}{os.pathsep}{folder}"
-    command = [sys.executable, str(root / f"stages/{arguments[0]}.py"), *arguments[1:]]
     environment = os.environ | {"PYTHONPATH": path, "ANYVIEW_WORKERS": "1"}
-    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+    return subprocess.run(
+        [sys.executable, *arguments], cwd=folder, env=environment, capture_output=True, text=True
+    )
+
+
+def stage(root: Path, folder: Path, name: str, cell: str) -> subprocess.CompletedProcess[str]:
+    """Run a stage's script in ``folder``."""
+    return run(root, folder, str(root / f"stages/{name}.py"), cell)
 
 
 def small_study(root: Path, folder: Path, *tasks: str) -> None:
@@ -113,18 +120,20 @@ for _ in range(49):
     *_, truncated, info = env.step(np.zeros(3, np.float32))
 print(truncated, info["distance"] > 0.03)
 """
-    path = f"{root / 'src'}{os.pathsep}{outside}"
-    done = subprocess.run(
-        [sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True
-    )
+    done = run(root, outside, "-c", code)
     assert done.stdout == "True True\n", done.stderr
 
 
+def test_a_task_from_outside_can_be_tried(root: Path, outside: Path) -> None:
+    done = run(root, outside, str(root / "examples/try_task.py"), "between")
+    assert done.stdout.startswith("the expert solves 1000 of 1000 contexts, "), done.stderr
+    assert read_video(outside / "between.avi").shape == (50, 32, 6 * 32, 3)
+
+
 def test_a_name_that_is_no_task_is_refused(root: Path, outside: Path, monkeypatch) -> None:
-    assert task_names() == ["push", "reach", "strike", "sweep"]
-    with pytest.raises(
-        AnyviewError, match="task raech: no such module; there are push, reach, strike, sweep"
-    ):
+    known = ", ".join(task_names())
+    assert {"push", "reach", "strike", "sweep"} <= set(task_names())
+    with pytest.raises(AnyviewError, match=f"task raech: no such module; there are {known}, and"):
         load_task("raech")
     (outside / "anyview_hollow.py").write_text("TASK = 'mine'\n")
     monkeypatch.syspath_prepend(outside)
@@ -142,4 +151,4 @@ def test_a_name_that_is_no_task_is_refused(root: Path, outside: Path, monkeypatc
     done = stage(root, outside, "simulate", "between")
     (outside / "params.yaml").write_text(params)
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert done.stderr.startswith("error: task betwixt: no such module; there are push, ")
+    assert done.stderr.startswith(f"error: task betwixt: no such module; there are {known}, ")

@@ -5,6 +5,7 @@ from pathlib import Path
 DATA = Path("data")
 METRICS = Path("metrics")
 REPORT = DATA / "report"
+RANKINGS = DATA / "rankings"  # scripted rollouts under the rewards of methods
 BEYOND = DATA / "beyond"  # the report on what goes beyond the thesis
 
 REAL = "real"  # the set of clips that ingest makes

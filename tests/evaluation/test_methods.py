@@ -1,4 +1,4 @@
-"""The `tcn` reward against its formula; the baselines in the evaluation that every method goes through."""
+"""Rewards of `tcn` and XIRL against their formulas; baselines in the evaluation of every method."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,6 +20,7 @@ from anyview.pusher.batch import PusherBatch
 from anyview.pusher.contexts import Context, sample_contexts
 from anyview.rewards.cells import make_reward
 from anyview.rewards.embedding import EmbeddingReward
+from anyview.rewards.goal import GoalReward
 from anyview.seeds import stream
 from anyview.video.pixels import to_input
 from anyview.video.sets import write_set, write_shard
@@ -59,6 +60,30 @@ def test_standing_still_earns_minus_one_a_step_in_every_run(model, expert_clips)
 def test_the_demonstration_itself_earns_nothing_less_than_the_best(model, expert_clips):
     reward = EmbeddingReward(model, expert_clips[:1], expert_clips[:1, 0], time_power=2.0)
     np.testing.assert_allclose(returns(reward, expert_clips[:1]), 0, atol=1e-4)
+
+
+def test_a_goal_is_the_mean_of_last_frames_whatever_the_step(model, expert_clips):
+    shown, agents = expert_clips[:2], expert_clips[2:4]
+    goal = model(to_input(shown[:, -1])).mean(0)
+    reward = GoalReward(model, shown, agents[:, 0])
+    now = agents[:, [7, 30]]  # 2 runs, 2 copies
+    away, still = (
+        np.linalg.norm((model(to_input(frames)) - goal).numpy(), axis=-1)
+        for frames in (now.reshape(4, *now.shape[2:]), agents[:, 0])
+    )
+    np.testing.assert_allclose(reward.scales, still, rtol=1e-4)
+    for step in (1, 49):
+        expected = -away.reshape(2, 2) / still[:, None]
+        np.testing.assert_allclose(reward.step(now, step), expected, rtol=1e-4)
+    np.testing.assert_allclose(reward.step(agents[:, :1], 1), -1, rtol=1e-4)
+
+
+def test_each_run_may_have_a_goal_of_its_own(model, expert_clips):
+    own = GoalReward(model, expert_clips[:2, None], expert_clips[:2, 0])
+    alone = GoalReward(model, expert_clips[1:2], expert_clips[1:2, 0])
+    now = expert_clips[2:4, 20:22]
+    np.testing.assert_allclose(own.step(now, 5)[1:], alone.step(now[1:], 5), rtol=1e-4)
+    np.testing.assert_allclose(own.step(expert_clips[:2, -1:], 49), 0, atol=1e-3)
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from ruamel.yaml import YAML
 from anyview.config import Params, load_params
 from anyview.evaluation.demonstrations import imitated_demonstrations, own_demonstrations, rig_demonstrations
 from anyview.learners.common.policies import load_policy
-from anyview.pusher.contexts import COLOURS, sample_contexts
+from anyview.pusher.contexts import COLOURS, Context, sample_contexts
 from anyview.pusher.expert import roll_out
 from anyview.pusher.render import renderer
 from anyview.rewards.demonstration import translate_demonstrations
@@ -46,6 +46,7 @@ def study(tmp_path_factory, root: Path) -> Path:
         "batch_size": 8,
     }
     params["beyond"]["cells"]["choice-one-clip"]["demonstrations"] = 2
+    params["beyond"]["cells"]["choice-angles"]["angles"] = [30, 180]
     with (folder / "params.yaml").open("w") as handle:
         yaml.dump(params, handle)
     contexts = sample_contexts(stream(0, "test"), CLIPS, "choice")[0]
@@ -56,9 +57,9 @@ def study(tmp_path_factory, root: Path) -> Path:
     where = folder / "data/clips/choice"
     where.mkdir(parents=True)
     stored = write_clips(where / "shard-0000.avi", np.stack(clips), 10.0)
-    write_set(
-        where, pd.DataFrame({"clip": names, "choice": [COLOURS[i % 2] for i in range(CLIPS)]}), [stored]
-    )
+    manifest = pd.DataFrame({"clip": names, "choice": [COLOURS[i % 2] for i in range(CLIPS)]})
+    manifest["context"] = [context.to_json() for context in contexts]
+    write_set(where, manifest, [stored])
     (folder / "data/splits").mkdir()
     split = ["train"] * 2 + ["validation"] * (CLIPS - 2)
     table = pd.DataFrame({"clip": names, "pair": names, "split": split})
@@ -100,6 +101,27 @@ def test_every_context_is_run_for_each_goal_by_clips_of_its_own(study, root):
         agent, imitated = np.split(read_video(folder / f"rollouts/run-{row.run:02d}.avi"), 2, axis=2)
         _, images = translate_demonstrations(model, clips, agent[:1])
         np.testing.assert_allclose(imitated[1:].astype(int), to_frames(images)[0].astype(int), atol=1)
+
+
+def test_every_context_is_run_for_each_angle_by_the_nearest_clip_of_each_goal(study, root):
+    command = [sys.executable, root / "stages/imitate.py", "choice-angles"]
+    done = subprocess.run(command, cwd=study, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    folder = study / "data/policies/choice-angles"
+    runs = pd.read_csv(folder / "runs.csv")
+    assert list(runs["context"]) == [0, 1] * 4
+    assert list(runs["choice"]) == ["red", "red", "green", "green"] * 2
+    assert list(runs["angle"]) == [30] * 4 + [180] * 4
+    manifest = pd.read_csv(study / "data/clips/choice/manifest.csv")[2:].set_index("clip")
+    azimuths = manifest["context"].map(lambda text: Context.from_json(text).azimuth)
+    shown = pd.read_csv(folder / "demonstrations.csv").set_index(["angle", "choice", "context"])["clip"]
+    for row in runs.itertuples():
+        context = load_policy(folder, row.run).context
+        assert context.choice.colour == row.choice
+        of_choice = azimuths[manifest["choice"] == row.choice]
+        angles = np.degrees(np.abs(np.angle(np.exp(1j * (of_choice - context.azimuth)))))
+        nearest = of_choice.index[np.abs(angles - row.angle).argmin()]
+        assert shown[row.angle, row.choice, row.context] == nearest
 
 
 def test_own_clips_are_held_out_ones_of_the_choice_and_fewer_are_the_first_of_more(study, params):

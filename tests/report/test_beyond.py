@@ -26,6 +26,35 @@ def two_goals(data: Data, cell: str, distance: float) -> None:
     shown.to_csv(folder / "demonstrations.csv", index=False)
 
 
+def angles(data: Data, cell: str, distance: float) -> None:
+    """Five contexts, each at three angles; of `choice-angles` for the one goal alone."""
+    data.policies(cell, distance)
+    folder = data.root / "data/policies" / cell
+    runs = pd.read_csv(folder / "runs.csv")
+    runs.insert(1, "context", runs["run"] % 5)
+    if cell.startswith("choice"):
+        runs.insert(2, "choice", "red")
+    runs.insert(2, "angle", np.repeat([0, 90, 180], 5))
+    runs.to_csv(folder / "runs.csv", index=False)
+
+
+def rankings(data: Data, methods: list[str]) -> None:
+    """Of every failure but the last, a good rollout earns more; of that one it earns less in one context."""
+    rows, values = [], []
+    for cell in methods:
+        kinds = ["good", "still", "wrong_place"] + (["other_goal"] if cell.startswith("choice") else [])
+        for context in range(4):
+            for kind in kinds:
+                score = {"good": -1, kinds[-1]: -2 if context else 0}.get(kind, -3)
+                rows.append((cell, context, context, kind, 0, 0.1, score))
+            values += [(cell, context, context, step, step**2) for step in (1, 5, 9)]
+    folder = data.root / "data/rankings"
+    folder.mkdir()
+    names = ["cell", "context", "run", "kind", "rollout", "final_distance", "return"]
+    pd.DataFrame(rows, columns=names).to_csv(folder / "rollouts.csv", index=False)
+    pd.DataFrame(values, columns=[*names[:3], "step", "value"]).to_csv(folder / "values.csv", index=False)
+
+
 @pytest.fixture(scope="module")
 def beyond(tmp_path_factory, params, report) -> Path:
     """The page of every cell."""
@@ -38,8 +67,9 @@ def beyond(tmp_path_factory, params, report) -> Path:
         data.translator(cell)
     data.policies("ours", 0.03)
     for index, (name, cell) in enumerate(params.beyond.cells.items()):
-        make = two_goals if cell.dataset == "choice" else Data.policies
+        make = angles if cell.angles else two_goals if cell.dataset == "choice" else Data.policies
         make(data, name, 0.01 + 0.02 * index)
+    rankings(data, params.beyond.ranking.methods)
     hand = data.root / "data/clips/real"
     hand.mkdir()
     stored = write_clips(hand / "clips.avi", clip(80, 0, 0)[None, :, ::2, ::2], 10.0)
@@ -57,6 +87,7 @@ def test_the_page_stands_alone_and_has_its_chapters(beyond):
     assert {link[1:] for link in page.links if link.startswith("#")} <= set(page.ids)
     wanted = {"choice", "one-context-under-two-clips", "where-the-object-ends", "how-many-clips", "rollouts"}
     wanted |= {"from-a-humans-hand-to-a-robot", "a-hand-and-the-robot"}
+    wanted |= {"any-viewpoint", "success-and-distance-by-angle", "rewards-that-know-failure"}
     assert wanted <= set(page.ids)
     assert all(page.alternatives)
 
@@ -64,15 +95,38 @@ def test_the_page_stands_alone_and_has_its_chapters(beyond):
 def test_tables_tell_of_every_cell(beyond, params):
     text = (beyond / "data/beyond/report.md").read_text(encoding="utf-8")
     tables = [block.splitlines() for block in text.split("\n\n") if block.startswith("|")]
-    assert len(tables) == 8
+    assert len(tables) == 10
     for rows in tables:
         assert {row.count(" | ") for row in rows} == {rows[0].count(" | ")}
     rows = {row.split(" | ")[0]: row for row in tables[-1]}
     assert rows["| `clips-5`"].split(" | ")[1:3] == ["5", "all"]
     assert rows["| `clips-every-4`"].split(" | ")[1:3] == ["20", "1 in 4"]
     assert rows["| `clips-two-thirds`"].split(" | ")[1:3] == ["20", "first 67%"]
+    by_angle, by_reward = tables[5:7]
+    assert [row.split(" | ")[:2] for row in by_angle[2:]] == [
+        [f"| {name} (one clip)", f"{angle}°"] for name in ("Ours", "Choice") for angle in (0, 90, 180)
+    ]
+    rows = {row.split(" | ")[0]: row.split(" | ")[1:] for row in by_reward}
+    assert rows["| Reward of"][2:] == ["Still", "Wrong place", "Other goal |"]
+    assert [cell.split()[0] for cell in rows["| `gail`"]] == ["1", "87.5%", "100%", "75%", "–"]
+    assert [cell.split()[0] for cell in rows["| `choice`"]] == ["1", "91.7%", "100%", "100%", "75%"]
+    assert rows["| Nothing but the time"] == ["1", "0%", "0%", "0%", "0% |"]
+    assert any(row.startswith("| A hand's clips, XIRL") for table in tables for row in table)
     metrics = json.loads((beyond / "metrics/beyond.json").read_text())
-    told = {cell for part in ("choice", "clips", "imitation", "tasks") for cell in metrics[part]}
+    assert metrics["rewards"]["gail"].keys() == {
+        f"{name}{end}" for name in ("value_order", "refused") for end in ("", "_low", "_high")
+    }
+    assert metrics["viewpoints"]["choice-angles"].keys() == {
+        "0",
+        "90",
+        "180",
+        "lost",
+        "lost_low",
+        "lost_high",
+    }
+    told = {
+        cell for part in ("choice", "clips", "viewpoints", "imitation", "tasks") for cell in metrics[part]
+    }
     assert told == {*params.beyond.cells, "ours"}
     assert metrics["clips"]["clips-1"].keys() == {
         "runs",

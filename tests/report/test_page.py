@@ -100,6 +100,7 @@ def test_the_numbers_come_as_markdown_too(whole):
     assert thesis.startswith("0%")
     assert here.startswith(("0%", "6.7%"))
     assert "Farther from the goal than ours" in text
+    assert "| real-adam | 120° | 6 | " in text
 
 
 def test_figures_are_files_of_their_own_too(whole):

@@ -72,6 +72,9 @@ def test_filming_again_gives_the_same_bytes(filmed, tmp_path):
 def test_both_views_are_colour_video_with_uneven_times_that_ingest_takes(filmed):
     folder, rows = filmed
     assert [row["camera"] for row in rows] == ["left", "right"]
+    left, right = (float(row["azimuth"]) for row in rows)
+    assert 95 <= left <= 215  # one camera on each side of the operator
+    assert not 85 < right < 325
     for row in rows:
         frames = read_video(folder / row["file"])
         times = pd.read_csv(folder / times_file(row["file"]))["seconds"].to_numpy()

@@ -18,9 +18,11 @@ from anyview.training.translator import TranslatorObjective
 from anyview.translator.keypoints import (
     KEYPOINTS,
     KeypointTranslator,
+    RelativeKeypointTranslator,
     _carry,
     _strokes,
     place_loss,
+    relative_places,
     with_places,
 )
 from anyview.translator.losses import Marks
@@ -30,10 +32,10 @@ from anyview.video.pixels import to_input
 from tests.training.discworld import SIZE, disc_marks
 
 
-@pytest.fixture
-def model() -> KeypointTranslator:
+@pytest.fixture(params=[KeypointTranslator, RelativeKeypointTranslator])
+def model(request) -> KeypointTranslator:
     torch.manual_seed(3)
-    return KeypointTranslator(16).eval()
+    return request.param(16).eval()
 
 
 def frames(count: int, size: int = 16) -> torch.Tensor:
@@ -181,6 +183,35 @@ def test_it_learns_where_things_go_and_draws_them_there(make_objective, discs, p
             lost.append(float((made - true).square().mean() / (true[:1] - true).square().mean()))
     assert np.mean(off) < 0.5 * np.mean(copied)
     assert np.mean(lost) < 0.8
+
+
+@given(
+    turn=st.floats(-3, 3),
+    scale=st.floats(0.5, 1.5),
+    shift=st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5)),
+    part=st.floats(0, 1),
+)
+def test_relative_places_are_the_same_however_the_picture_is_turned(turn, scale, shift, part):
+    """And a keypoint that has gone part of the way from the first to the second is there."""
+    rng = np.random.default_rng(0)
+    first = np.array([[-0.4, 0.1], [0.3, 0.4], *rng.uniform(-0.5, 0.5, (KEYPOINTS - 2, 2))])
+    now = first + rng.uniform(-0.2, 0.2, first.shape)
+    now[0] = first[0] + part * (first[1] - first[0])
+
+    def seen(places: np.ndarray) -> torch.Tensor:
+        turned = places @ [[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]
+        return torch.from_numpy(np.append(scale * turned + shift, np.zeros(32))[None])
+
+    found = relative_places(seen(now), seen(first))
+    plain = relative_places(*(torch.from_numpy(np.append(each, np.zeros(32))[None]) for each in (now, first)))
+    torch.testing.assert_close(found, plain)
+    torch.testing.assert_close(found[0, :2], torch.tensor([part, 0.0], dtype=torch.float64))
+
+
+def test_relative_places_are_finite_where_object_and_target_are_one():
+    code = torch.full((1, 48), 0.2, requires_grad=True)
+    relative_places(code, code).sum().backward()
+    assert code.grad.isfinite().all()
 
 
 def test_an_impossible_size_is_refused():

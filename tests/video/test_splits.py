@@ -32,6 +32,17 @@ def test_the_study_has_122_21_and_10_for_any_seed(seed):
     assert counts(table) == {"train": 122, "validation": 21, "extreme": 10}
 
 
+@settings(max_examples=10, deadline=None)
+@given(seed=st.integers(0, 1000))
+def test_12_61_or_135_pairs_to_train_on_are_nested_and_the_same_clips_are_held_out(seed):
+    kinds = ("standard", "distractor", "extreme_view")
+    tables = [split_pairs(clips(145, 1, 5, kinds), seed, 2 * pairs, 21) for pairs in (12, 61, 135)]
+    few, some, most = (table.groupby("split")["pair"].agg(set) for table in tables)
+    assert few["validation"] == some["validation"] == most["validation"]
+    assert few["train"] < some["train"] < most["train"]
+    assert [len(each["train"]) for each in (few, some, most)] == [12, 61, 135]
+
+
 @settings(max_examples=50, deadline=None)
 @given(
     pairs=st.integers(3, 60),

@@ -22,7 +22,7 @@ class Curves(NamedTuple):
 
 def tuning(params: Params, methods: Methods) -> dict[str, EvaluatedMethod]:
     """The methods in tuning contexts, in the order of params."""
-    cells = params.beyond.cells
+    cells = _demonstrated(params)
     return {cell: methods[cell] for cell in cells if cell in methods and cells[cell].contexts == "tuning"}
 
 
@@ -33,7 +33,7 @@ def by_clips(params: Params, methods: Methods, estimator: Estimator) -> pd.DataF
 
 def curves(params: Params, table: pd.DataFrame) -> Curves:
     """Which cells of ``by_clips`` are on which curve. The second begins with as many complete clips."""
-    cells = {cell: params.beyond.cells[cell] for cell in table["cell"].unique()}
+    cells = {cell: _demonstrated(params)[cell] for cell in table["cell"].unique()}
     complete = [cell for cell, method in cells.items() if _complete(method)]
     incomplete = [cell for cell in cells if cell not in complete]
     numbers = {cells[cell].demonstrations for cell in incomplete}
@@ -48,6 +48,11 @@ def _by_clips(methods: Methods, estimator: Estimator) -> Iterator[tuple[str, str
         yield cell, SUCCESS, proportion(int(runs["success"].sum()), len(runs))
         distances = runs["final_distance"].to_numpy(float)
         yield cell, DISTANCE, estimator.median(f"{cell}/final_distance", distances)
+
+
+def _demonstrated(params: Params) -> dict[str, BeyondCell]:
+    """The cells whose reward follows clips from their start to their end."""
+    return {name: cell for name, cell in params.beyond.cells.items() if isinstance(cell, BeyondCell)}
 
 
 def _complete(cell: BeyondCell) -> bool:

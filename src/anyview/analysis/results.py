@@ -11,6 +11,7 @@ from anyview.analysis.cells import ADAM, AUGMENTED, SIM, in_order
 from anyview.analysis.diagnosis import Diagnosis, diagnose
 from anyview.analysis.estimates import Estimate, Estimator, proportion, tidy, without_interval
 from anyview.analysis.study import LOSSES, RETURNS, YARDSTICKS, AssessedTranslator, EvaluatedMethod, Study
+from anyview.analysis.viewpoints import placed_by_angle
 
 Rows = Iterator[tuple[str, str, Estimate]]
 
@@ -38,6 +39,8 @@ class Results:
     learning: pd.DataFrame
     diagnoses: dict[str, Diagnosis]
     distances: pd.DataFrame
+    viewpoints: pd.DataFrame
+    """See ``viewpoints.placed_by_angle``."""
     real: tuple[str, ...]
     """Translators of real clips, or of their surrogate."""
 
@@ -64,6 +67,7 @@ def analyse(study: Study) -> Results:
         learning=curves.learning(methods),
         diagnoses={cell: diagnose(method) for cell, method in methods.items()},
         distances=distances(methods),
+        viewpoints=placed_by_angle(study, estimator),
         real=tuple(cell for cell in study.translators if study.is_real(cell)),
     )
 

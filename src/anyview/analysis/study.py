@@ -1,7 +1,7 @@
 """Outputs of the stages, read once and checked when they are read: tables as data frames, clips on demand."""
 
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from anyview.video.splits import read_split
 LOSSES = ("loss", "translation", "reconstruction", "alignment", "psnr", "ssim")
 YARDSTICKS = ("copy_loss", "mean_loss", "placed", "placed_on_way", "copy_placed")
 """See ``assessment.yardsticks``; empty for a clip to which one does not apply."""
+SURROGATE = "surrogate"
 RETURNS = ("return_policy", "return_still", "return_arm_only", "return_expert")
 
 
@@ -60,7 +61,7 @@ class TrainedModel:
 class AssessedTranslator:
     """A translator on held-out clips: a row per clip, a weight per frame (T,).
 
-    Columns: ``clip, split``, LOSSES, YARDSTICKS.
+    Columns: ``clip, source, split``, LOSSES, YARDSTICKS.
     """
 
     folder: Path
@@ -127,6 +128,18 @@ class EvaluatedMethod:
 
 
 @dataclass(frozen=True)
+class Rankings:
+    """Scripted rollouts under the reward of each method; runs of one ``context`` are of both choices.
+
+    ``rollouts``: ``cell, context, run, kind, rollout, final_distance, return``. ``values``, of the frames of
+    a good one: ``cell, context, run, step, value``.
+    """
+
+    rollouts: pd.DataFrame
+    values: pd.DataFrame
+
+
+@dataclass(frozen=True)
 class Study:
     """Everything a report is made from. Only what exists: a cell that was not run has no entry."""
 
@@ -137,12 +150,15 @@ class Study:
     models: dict[str, TrainedModel]
     translators: dict[str, AssessedTranslator]
     methods: dict[str, EvaluatedMethod]
+    azimuths: pd.Series
+    """Where the camera of each filmed clip stood, degrees by clip; empty where nothing tells."""
+    rankings: Rankings | None
     sources: tuple[Path, ...]
 
     @property
     def surrogate(self) -> bool:
         """Whether the "real" clips are rendered stand-ins."""
-        return self.params.real.source == "surrogate"
+        return self.params.real.source == SURROGATE
 
     def is_real(self, cell: str) -> bool:
         """Whether a translator cell was trained on the real clips, or on their surrogate."""
@@ -162,7 +178,9 @@ def read_study(params: Params, root: Path = Path()) -> Study:
     models = present(paths.model, params.translators)
     translations = present(paths.translations, params.translators)
     policies = present(paths.policies, params.methods)
-    groups = (simulated, real, splits, models, translations, policies)
+    filmed = present(paths.raw, [SURROGATE] if real and params.real.source == SURROGATE else [])
+    rankings = present(lambda _: paths.RANKINGS, [paths.RANKINGS.name])
+    groups = (simulated, real, splits, models, translations, policies, filmed, rankings)
     if not any(groups):
         raise AnyviewError(f"{root / paths.DATA}: nothing to report on yet; run `dvc repro`")
     return Study(
@@ -173,6 +191,8 @@ def read_study(params: Params, root: Path = Path()) -> Study:
         {cell: _model(folder) for cell, folder in models.items()},
         {cell: _translator(folder) for cell, folder in translations.items()},
         {cell: read_method(folder) for cell, folder in policies.items()},
+        _azimuths(real[paths.REAL], filmed[SURROGATE]) if filmed else pd.Series(dtype=float),
+        _rankings(root / paths.RANKINGS) if rankings else None,
         tuple(path for group in groups for path in group.values()),
     )
 
@@ -187,13 +207,32 @@ def _real(folder: Path) -> RealClips:
     return RealClips(len(recorded), len(refused))
 
 
+def _azimuths(clips: Path, raw: Path) -> pd.Series:
+    """Where the cameras stood of those ``clips`` whose ``raw`` ones tell it."""
+    named = read_table(clips / "manifest.csv", ["clip", "pair", "camera"], unique="clip")
+    told = read_table(raw / "manifest.csv", ["pair", "camera"])
+    if "azimuth" not in told:
+        return pd.Series(dtype=float)
+    merged = named.merge(told[["pair", "camera", "azimuth"]], on=["pair", "camera"])
+    return pd.to_numeric(merged.set_index("clip")["azimuth"])
+
+
+def _rankings(folder: Path) -> Rankings:
+    keys, text = ["context", "run"], ("cell", "kind")
+    return Rankings(
+        _numbers(folder / "rollouts.csv", ["cell", *keys, "kind", "final_distance", "return"], text),
+        _numbers(folder / "values.csv", ["cell", *keys, "step", "value"], text),
+    )
+
+
 def _model(folder: Path) -> TrainedModel:
     curve = _numbers(folder / "curve.csv", ["iteration", "loss", "validation_loss"])
     return TrainedModel(curve, int(_json(folder / "model.json", "best_iteration")["best_iteration"]))
 
 
 def _translator(folder: Path) -> AssessedTranslator:
-    clips = read_table(folder / "clips.csv", ["clip", "split", *LOSSES, *YARDSTICKS], unique="clip")
+    columns = ["clip", "source", "split", *LOSSES, *YARDSTICKS]
+    clips = read_table(folder / "clips.csv", columns, unique="clip")
     clips[list(YARDSTICKS)] = clips[list(YARDSTICKS)].apply(pd.to_numeric, errors="coerce")
     weights = _numbers(folder / "feature_weights.csv", ["frame", "weight"])
     return AssessedTranslator(folder, clips, weights["weight"].to_numpy())
@@ -201,19 +240,19 @@ def _translator(folder: Path) -> AssessedTranslator:
 
 def read_method(folder: Path) -> EvaluatedMethod:
     """Read one method's folder; AnyviewError names a broken file."""
-    runs = _numbers(folder / "runs.csv", ["run", "success", "final_distance"], text="choice")
+    runs = _numbers(folder / "runs.csv", ["run", "success", "final_distance"], text=("choice",))
     curve = _numbers(folder / "curve.csv", ["iteration", "run", "final_distance", "return"])
     demonstrations = read_table(folder / "demonstrations.csv", ["clip"])["clip"]
     return EvaluatedMethod(folder, runs.sort_values("run", ignore_index=True), curve, tuple(demonstrations))
 
 
-def _numbers(path: Path, columns: list[str], text: str = "") -> pd.DataFrame:
+def _numbers(path: Path, columns: list[str], text: Sequence[str] = ()) -> pd.DataFrame:
     """A table whose columns are numbers; empty cells are NaN, but not in the columns that must be there.
 
-    A column ``text`` stays as it is.
+    The columns ``text`` stay as they are.
     """
     table = read_table(path, columns)
-    for column in table.columns.drop(text, errors="ignore"):
+    for column in table.columns.drop(list(text), errors="ignore"):
         written = table[column]
         table[column] = pd.to_numeric(written.replace({"True": 1, "False": 0, "": None}), errors="coerce")
         if (table[column].isna() & (written != "")).any() or (

@@ -9,6 +9,7 @@ from anyview.config.imitation import (
     DemonstrationCell,
     Discriminator,
     EmbeddingRewardCell,
+    GoalCell,
     ImitationCell,
     Incomplete,
     RewardWeights,
@@ -17,6 +18,7 @@ from anyview.config.params import Params
 from anyview.config.reading import load_params, parse_params, read_yaml
 from anyview.config.translators import (
     Assessment,
+    CycleCell,
     EmbeddingCell,
     LossWeights,
     Pretraining,
@@ -30,10 +32,12 @@ __all__ = [
     "AdversarialCell",
     "Assessment",
     "BeyondCell",
+    "CycleCell",
     "DemonstrationCell",
     "Discriminator",
     "EmbeddingCell",
     "EmbeddingRewardCell",
+    "GoalCell",
     "ImitationCell",
     "Incomplete",
     "Ingest",

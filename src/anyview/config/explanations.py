@@ -11,7 +11,7 @@ def explain(error: ValidationError) -> str:
     # Unknown keys first: one that is missing beside them is most often the same one, misspelt.
     first, *others = sorted(error.errors(), key=lambda found: found["type"] != "extra_forbidden")
     loc = first["loc"]
-    if loc[:2] == ("imitation", "cells"):
+    if loc[:2] in (("imitation", "cells"), ("beyond", "cells")):
         loc = loc[:3] + loc[4:]  # without the tag of the reward's kind
     key = ".".join(str(part) for part in loc if part != "[key]") or "the file"
     if first["type"] == "extra_forbidden":
@@ -22,7 +22,8 @@ def explain(error: ValidationError) -> str:
         message = first["msg"].removeprefix("Value error, ")
         if first["type"].startswith("union_tag"):
             key += ".reward"
-            message = "Input should be 'translated', 'true', 'clock' or 'embedding'"
+            last = "goal" if loc[0] == "beyond" else "embedding"
+            message = f"Input should be 'translated', 'true', 'clock' or '{last}'"
         if not isinstance(first["input"], dict | list | set):  # aliases can make these endless
             message += f", got {brief(first['input'])}"
     return f"{key}: {message}" + (f" (and {len(others)} more)" if others else "")

@@ -1,8 +1,9 @@
 """Methods: learners, rewards, and what is imitated."""
 
+from collections.abc import Sequence
 from typing import Annotated, Literal, NamedTuple
 
-from pydantic import Field, model_validator
+from pydantic import Field, SerializeAsAny, model_validator
 
 from anyview.config.values import (
     Block,
@@ -111,6 +112,8 @@ class Shown(NamedTuple):
     """Whether every context has clips of its own."""
     contexts: Literal["evaluation", "tuning"] = "evaluation"
     """The random stream that the contexts are drawn from."""
+    angles: Sequence[int] = ()
+    """Degrees between the cameras of clip and agent, once for each of which every context is run."""
 
 
 class MethodCell(Block):
@@ -164,7 +167,8 @@ class Imitation(Block):
     )
     ddpg: DDPG
     trpo: TRPO
-    cells: dict[Name, Annotated[ImitationCell, Field(discriminator="reward")]]
+    # As what they are: those of `beyond` take their place in `Params.imitating`.
+    cells: SerializeAsAny[dict[Name, Annotated[ImitationCell, Field(discriminator="reward")]]]
 
 
 class AdversarialCell(MethodCell):
@@ -181,8 +185,8 @@ class Adversarial(Block):
     cells: dict[Name, AdversarialCell]
 
 
-class BeyondCell(WithExperts, DemonstrationCell):
-    """One method of the studies beyond the thesis, with the runs and learners of `imitation`."""
+class BeyondMethodCell(WithExperts, MethodCell):
+    """A method of the studies beyond the thesis, with the runs and learners of `imitation`."""
 
     dataset: str = Field(
         description="simulated set whose task is done; where its clips choose between two goals, every "
@@ -201,6 +205,32 @@ class BeyondCell(WithExperts, DemonstrationCell):
         default="evaluation", description="the random stream that the contexts are drawn from"
     )
 
+    angles: list[Annotated[int, Field(ge=0, le=180)]] = Field(
+        default=[],
+        description="degrees between the camera of a clip and the agent's: every context is run once for "
+        "each, with the clips of its own that are nearest to it",
+    )
+
     @property
     def shown(self) -> Shown:
-        return Shown(self.other_experts, self.own_clips, self.contexts)
+        return Shown(self.other_experts, self.own_clips, self.contexts, self.angles)
+
+    @model_validator(mode="after")
+    def _angles_of_own_clips(self) -> "BeyondMethodCell":
+        if self.angles and not self.own_clips:
+            raise ValueError("angles: chosen for each context's own camera, which needs own_clips")
+        if len(set(self.angles)) < len(self.angles):
+            raise ValueError("angles: one is listed twice")
+        return self
+
+
+class BeyondCell(BeyondMethodCell, DemonstrationCell):
+    """One method of the studies beyond the thesis, with the runs and learners of `imitation`."""
+
+
+class GoalCell(BeyondMethodCell):
+    """One method rewarded by the distance to the demonstrations' last frames in an embedding: XIRL."""
+
+    learner: Literal["ddpg", "trpo"]
+    reward: Literal["goal"]
+    model: str = Field(description="the embedding: a cell of `beyond.embeddings`")

@@ -1,6 +1,6 @@
 """The whole of ``params.yaml``."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -12,10 +12,11 @@ from anyview.config.imitation import (
     BeyondCell,
     DemonstrationCell,
     EmbeddingRewardCell,
+    GoalCell,
     Imitation,
 )
-from anyview.config.translators import Assessment, EmbeddingCell, Training, TranslatorCell
-from anyview.config.values import Block, Name
+from anyview.config.translators import Assessment, CycleCell, EmbeddingCell, Training, TranslatorCell
+from anyview.config.values import Block, Count, Name
 
 
 class Base(Block):
@@ -33,13 +34,24 @@ class Sim(Block):
     )
 
 
+class Ranking(Block):
+    """Stage `rank`: scripted rollouts, good and failed ones, under the rewards of methods."""
+
+    methods: list[str] = Field(
+        min_length=1, description="cells of `imitation`, `adversarial` and `beyond`: the methods"
+    )
+    rollouts: Count = Field(description="rollouts of each kind in a context")
+
+
 class Beyond(Block):
     """What goes beyond the thesis, by the pipeline beyond/dvc.yaml: sets and cells as in the blocks above."""
 
     sets: dict[Name, DemonstrationSet]
     split: dict[Name, SplitSet]
     translators: dict[Name, TranslatorCell]
-    cells: dict[Name, BeyondCell]
+    embeddings: dict[Name, CycleCell]
+    cells: dict[Name, Annotated[BeyondCell | GoalCell, Field(discriminator="reward")]]
+    ranking: Ranking
 
 
 class Params(Block):
@@ -95,6 +107,6 @@ class Params(Block):
         return self.model_copy(update={"imitation": self.imitation.model_copy(update=changed)})
 
     @property
-    def methods(self) -> dict[str, DemonstrationCell | EmbeddingRewardCell | AdversarialCell]:
+    def methods(self) -> dict[str, DemonstrationCell | EmbeddingRewardCell | GoalCell | AdversarialCell]:
         """Every method of the thesis's study, by its cell's name."""
         return {**self.imitation.cells, **self.adversarial.cells}

@@ -7,6 +7,8 @@ from anyview.config.params import Params
 from anyview.paths import REAL, RENDERED
 from anyview.runtime.errors import AnyviewError
 
+_HANDS_TASK = "push"  # what is done in the rig's clips
+
 
 def check_references(params: Params, name: str) -> None:
     """Raise AnyviewError, with the key's name in the file ``name``, if a key does not fit the others."""
@@ -24,19 +26,25 @@ def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
     sets = [*params.simulate.sets, REAL, RENDERED]
     yield from ((f"split.{name}", name, sets) for name in params.split)
     yield from ((f"beyond.split.{name}", name, list(params.beyond.sets)) for name in params.beyond.split)
+    simulated = params.demonstration_sets
+    pushes = [name for name, wanted in simulated.items() if wanted.task == _HANDS_TASK]
     for key, beyond in params.beyond.translators.items():
-        yield f"beyond.translators.{key}.dataset", beyond.dataset, list(params.demonstration_sets)
-        yield (
-            f"beyond.translators.{key}.pretraining.dataset",
-            beyond.pretraining.dataset,
-            [REAL, RENDERED] if beyond.other_experts else list(params.demonstration_sets),
-        )
+        yield f"beyond.translators.{key}.dataset", beyond.dataset, list(simulated)
         if beyond.other_experts:
             yield f"beyond.translators.{key}.experts", beyond.other_experts, [REAL, RENDERED]
+            yield f"beyond.translators.{key}.dataset", beyond.dataset, pushes
+        before = [REAL, RENDERED] if beyond.other_experts else list(simulated)
+        yield f"beyond.translators.{key}.pretraining.dataset", beyond.pretraining.dataset, before
     for key, method in params.beyond.cells.items():
         yield f"beyond.cells.{key}.dataset", method.dataset, list(params.demonstration_sets)
         yield f"beyond.cells.{key}.experts", method.experts, [method.dataset, REAL]
-        yield f"beyond.cells.{key}.model", method.model, list(params.translator_cells)
+        fitting = params.beyond.embeddings if method.reward == "goal" else params.translator_cells
+        yield f"beyond.cells.{key}.model", method.model, list(fitting)
+    for key, embedding in params.beyond.embeddings.items():
+        yield f"beyond.embeddings.{key}.dataset", embedding.dataset, list(params.demonstration_sets)
+        yield f"beyond.embeddings.{key}.experts", embedding.experts, [embedding.dataset, REAL]
+    ranked = [*params.methods, *params.beyond.cells]
+    yield from (("beyond.ranking.methods", name, ranked) for name in params.beyond.ranking.methods)
     for block, models in (("translators", params.translators), ("embeddings", params.embeddings)):
         yield from ((f"{block}.{key}.dataset", cell.dataset, sets) for key, cell in models.items())
     for key, translator in params.translators.items():
@@ -45,8 +53,8 @@ def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
             yield f"translators.{key}.experts", translator.experts, [translator.dataset]
     yield "imitation.dataset", params.imitation.dataset, list(params.simulate.sets)
     for key, cell in params.imitation.cells.items():
-        fitting = params.embeddings if cell.reward == "embedding" else params.translators
-        yield f"imitation.cells.{key}.model", cell.model, fitting
+        models_of = params.embeddings if cell.reward == "embedding" else params.translators
+        yield f"imitation.cells.{key}.model", cell.model, models_of
     losses, diversity, headline = params.evidence.losses, params.evidence.diversity, params.evidence.headline
     yield from (("evidence.losses.translators", name, params.translators) for name in losses.translators)
     yield "evidence.diversity.translator", diversity.translator, params.translators
@@ -106,6 +114,12 @@ def _refuse_twins(params: Params, name: str) -> None:
             params.beyond.translators,
             "translators or embeddings",
             [*params.translators, *params.embeddings],
+        ),
+        (
+            "beyond.embeddings",
+            params.beyond.embeddings,
+            "translators or embeddings",
+            [*params.translator_cells, *params.embeddings],
         ),
         ("beyond.cells", params.beyond.cells, "imitation.cells or adversarial.cells", params.methods),
         ("simulate.sets", params.simulate.sets, "the clips that stage render makes", [RENDERED]),

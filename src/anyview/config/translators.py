@@ -1,6 +1,6 @@
 """Translators and embeddings: what each learns from, how they train, how they are assessed."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
@@ -15,7 +15,7 @@ class LossWeights(Block):
     alignment: NonNegative
     places: NonNegative = Field(
         default=0.0,
-        description="of keypoints away from marks: for the architecture `keypoint`, on clips with marks",
+        description="of keypoints away from marks: `keypoint` and `keypoint-relative`, on clips with marks",
     )
 
     @model_validator(mode="after")
@@ -39,7 +39,7 @@ class TranslatorCell(WithExperts):
     """Stage `train`: one context translator."""
 
     dataset: str = Field(description="set of clips to learn from")
-    architecture: Literal["real", "sim", "compact", "keypoint"]
+    architecture: Literal["real", "sim", "compact", "keypoint", "keypoint-relative"]
     optimizer: Literal["adam", "adadelta"]
     iterations: Count
     weights: LossWeights
@@ -76,6 +76,20 @@ class EmbeddingCell(Block):
     iterations: Count
     dimensions: Count = Field(description="size of the embedding")
     margin: Positive = Field(description="triplet margin")
+
+
+class CycleCell(WithExperts):
+    """Stage `embed` of the pipeline beyond: XIRL's embedding, by cycles in time between whole clips."""
+
+    dataset: str = Field(description="set of clips to learn from")
+    experts: str = Field(description="set of the other half of the clips: of the rig, or `dataset` itself")
+    iterations: Count
+    dimensions: Count = Field(description="size of the embedding")
+    clips: Annotated[int, Field(ge=4, le=1000, multiple_of=2)] = Field(
+        description="clips in a batch, half of them of the experts"
+    )
+    frames: Annotated[int, Field(ge=2, le=1000)] = Field(description="frames of each, all of it at most")
+    temperature: Positive = Field(description="of the softmax over frames, by squared distance")
 
 
 class Training(Block):

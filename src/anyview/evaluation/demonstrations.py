@@ -1,5 +1,6 @@
 """The clips of the expert: those that agents imitate, and those that discriminators learn from."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from anyview import paths
 from anyview.config import Params
 from anyview.pusher.contexts import COLOURS, Colour, Context
+from anyview.pusher.kinematics import wrap
 from anyview.runtime.errors import AnyviewError
 from anyview.seeds import stream
 from anyview.video.datasets import open_dataset
@@ -51,13 +53,19 @@ def own_demonstrations(params: Params, contexts: int, choice: Colour | None = No
     Fewer clips of a context are the first of more.
     """
     store, rows = _split_rows(params, "validation", choice)
-    _check_count(params, rows, params.imitation.demonstrations, f"holds out {len(rows)}")
-    drawn = [stream(params.base.seed, "imitated", context).permutation(rows) for context in range(contexts)]
-    chosen = np.stack(drawn)[:, : params.imitation.demonstrations]
-    frames = np.stack([store.frames[row] for row in chosen.flat])
-    return Clips(
-        list(store.manifest["clip"].iloc[chosen.flat]), frames.reshape(*chosen.shape, *frames.shape[1:])
-    )
+    orders = [stream(params.base.seed, "imitated", context).permutation(rows) for context in range(contexts)]
+    return _first_of(params, store, orders)
+
+
+def angled_demonstrations(
+    params: Params, contexts: Sequence[Context], angle: float, choice: Colour | None = None
+) -> Clips:
+    """As ``own_demonstrations``: those whose cameras are nearest to ``angle`` degrees from the context's."""
+    store, rows = _split_rows(params, "validation", choice)
+    filmed = np.array([context.azimuth for context in _contexts(params, store, rows)])
+    beside = [np.abs(wrap(filmed - context.azimuth)) for context in contexts]
+    orders = [rows[np.abs(each - np.deg2rad(angle)).argsort(kind="stable")] for each in beside]
+    return _first_of(params, store, orders)
 
 
 def clock_clips(params: Params) -> Clips:
@@ -86,10 +94,26 @@ def training_clips(params: Params) -> tuple[np.ndarray, np.ndarray, list[Context
     Raises AnyviewError where the frames are of another size than the agents'.
     """
     store, rows = _split_rows(params, "train")
+    return store.frames, rows, _contexts(params, store, rows)
+
+
+def _contexts(params: Params, store: FrameStore, rows: np.ndarray) -> list[Context]:
+    """Of the clips ``rows``. Raises AnyviewError if the manifest does not tell."""
     if "context" not in store.manifest:
         manifest = paths.clip_set(params.imitation.dataset) / "manifest.csv"
         raise AnyviewError(f"{manifest}: no column context; run the simulate stage again")
-    return store.frames, rows, [Context.from_json(text) for text in store.manifest["context"].iloc[rows]]
+    return [Context.from_json(text) for text in store.manifest["context"].iloc[rows]]
+
+
+def _first_of(params: Params, store: FrameStore, orders: Sequence[np.ndarray]) -> Clips:
+    """As many clips as are wanted of each context's order of rows, which must have them."""
+    wanted = params.imitation.demonstrations
+    _check_count(params, orders[0], wanted, f"holds out {len(orders[0])}")
+    chosen = np.stack(orders)[:, :wanted]
+    frames = np.stack([store.frames[row] for row in chosen.flat])
+    return Clips(
+        list(store.manifest["clip"].iloc[chosen.flat]), frames.reshape(*chosen.shape, *frames.shape[1:])
+    )
 
 
 def _draw(

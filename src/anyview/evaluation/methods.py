@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from anyview.config import AdversarialCell, ImitationCell, Params
+from anyview.config import AdversarialCell, GoalCell, ImitationCell, Params
 from anyview.learners.common.interfaces import Learner, RewardSource
 from anyview.pusher.contexts import Context
 
@@ -20,7 +20,7 @@ class Group:
     """Runs that train in lockstep. R runs, m demonstrations; frames are uint8 RGB."""
 
     params: Params
-    cell: ImitationCell | AdversarialCell
+    cell: ImitationCell | GoalCell | AdversarialCell
     runs: Sequence[int]
     contexts: Sequence[Context]
     demonstrations: np.ndarray

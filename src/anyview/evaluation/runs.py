@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -38,6 +39,15 @@ class Result:
     rollouts: np.ndarray
 
 
+class Prepared(NamedTuple):
+    """A group of runs before its training, and where its experts went: ``positions`` (R, 50, 3 + 2 k)."""
+
+    group: Group
+    positions: np.ndarray
+    learner: Learner
+    scoring: Scoring
+
+
 def groups_of(runs: int, size: int) -> list[range]:
     """Runs 0 to ``runs`` - 1 in groups of at most ``size``: 15 by 8 are 8 and 7.
 
@@ -63,19 +73,14 @@ def evaluate_group(
     where they are (R, m, 50, H, W, 3).
     """
     use_threads(1)
-    positions, _ = roll_out(contexts)
-    own = _film(params, contexts, positions)
-    group = Group(params, params.methods[name], runs, contexts, demonstrations, own)
-    task, goals = contexts[0].task, len(contexts[0].goals)
-    learner = method.make_learner(params, runs, observation_size(task, goals))
-    scoring = method.make_reward(group)
-    label = f"{name}, runs {runs[0]} to {runs[-1]}" if len(runs) > 1 else name
-    curve = _train(label, group, learner, scoring, Checkpoints(scratch))
+    prepared = prepare(name, params, method, runs, contexts, demonstrations)
+    curve = train(name, prepared, scratch)
+    group, positions, learner, scoring = prepared
 
     agent, distance, other = _perform(group, learner)
     columns = {
         "run": list(runs),
-        "success": (distance < load_task(task).tolerance).astype(int),
+        "success": (distance < load_task(contexts[0].task).tolerance).astype(int),
         "final_distance": distance,
         "return_policy": _returns(scoring, agent),
     }
@@ -85,22 +90,40 @@ def evaluate_group(
         arm_alone = positions.copy()
         arm_alone[:, :, 3:] = positions[:, :1, 3:]
         columns |= {
-            "return_still": _returns(scoring, np.repeat(own[:, :1], FRAMES, axis=1)),
+            "return_still": _returns(scoring, np.repeat(group.own[:, :1], FRAMES, axis=1)),
             "return_arm_only": _returns(scoring, _film(params, contexts, arm_alone)),
-            "return_expert": _returns(scoring, own),
+            "return_expert": _returns(scoring, group.own),
         }
     rollouts = np.concatenate([agent, scoring.shown], axis=3)
     return Result(pd.DataFrame(columns), curve, learner.policy(), rollouts)
 
 
-def _train(
-    label: str, group: Group, learner: Learner, scoring: Scoring, checkpoints: Checkpoints
-) -> pd.DataFrame:
-    """Train ``learner``; returns the curves: ``iteration, run, final_distance, return`` and measures.
+def prepare(
+    name: str,
+    params: Params,
+    method: Method,
+    runs: Sequence[int],
+    contexts: Sequence[Context],
+    demonstrations: np.ndarray,
+) -> Prepared:
+    """The ``runs`` of cell ``name``, untrained: see ``evaluate_group``."""
+    positions, _ = roll_out(contexts)
+    own = _film(params, contexts, positions)
+    group = Group(params, params.methods[name], runs, contexts, demonstrations, own)
+    learner = method.make_learner(params, runs, observation_size(contexts[0].task, len(contexts[0].goals)))
+    return Prepared(group, positions, learner, method.make_reward(group))
 
-    At each point the policies act once without noise for their distance; the return is what the exploring
-    episodes earned since the point before.
+
+def train(name: str, prepared: Prepared, scratch: Path) -> pd.DataFrame:
+    """Train the policies of cell ``name``, and their reward if it learns; continues from ``scratch``.
+
+    Returns the curves: ``iteration, run, final_distance, return`` and measures. At each point the policies
+    act once without noise for their distance; the return is what the exploring episodes earned since the
+    point before.
     """
+    group, _, learner, scoring = prepared
+    checkpoints = Checkpoints(scratch)
+    label = f"{name}, runs {group.runs[0]} to {group.runs[-1]}" if len(group.runs) > 1 else name
     params = group.params.imitation
     copies = [context for context in group.contexts for _ in range(params.episodes_per_iteration)]
     control, size = group.params.sim.control, group.params.sim.image_size

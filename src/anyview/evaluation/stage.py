@@ -3,7 +3,7 @@
 import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -12,6 +12,7 @@ from anyview import paths
 from anyview.config import Params
 from anyview.evaluation.demonstrations import (
     Clips,
+    angled_demonstrations,
     clock_clips,
     imitated_demonstrations,
     own_demonstrations,
@@ -32,6 +33,26 @@ from anyview.video.files import write_video
 RATE = 10.0  # frames a second
 
 
+class Setting(NamedTuple):
+    """What all contexts of a method are shown: clips that go to one goal, or were filmed from one angle."""
+
+    contexts: list[Context]
+    clips: Clips
+    choice: Colour | None = None
+    angle: int | None = None
+
+    def of(self, group: Sequence[int]) -> tuple[list[Context], np.ndarray]:
+        """Contexts and clips of a group of them; see ``Group.demonstrations``."""
+        frames = self.clips.frames
+        own = frames.ndim == 6
+        return [self.contexts[context] for context in group], frames[list(group)] if own else frames
+
+    def named(self) -> dict[str, str | int]:
+        """What distinguishes the setting from others of the same method."""
+        names = {"choice": self.choice, "angle": self.angle}
+        return {name: value for name, value in names.items() if value is not None}
+
+
 def evaluate_method(
     name: str,
     params: Params,
@@ -50,35 +71,35 @@ def evaluate_method(
     - ``rollouts/run-<run>.avi``: the agent's frames with the imitated demonstration to their right;
     - ``demonstrations.csv``: the clips that are imitated, with their ``context`` if each has its own.
 
-    Where the demonstrations choose between two goals, every context is run twice: first all of them with
-    clips of the one choice, then all with clips of the other. ``runs.csv`` has the columns ``context`` and
-    ``choice`` then, and ``demonstrations.csv`` has ``choice``.
+    Every context is run once in each of the cell's ``settings``. Where clips are told apart by their choice
+    or angle, ``runs.csv`` has the column ``context``, and both tables have ``choice`` or ``angle``.
     """
-    own = params.methods[name].shown.own_clips
-    imitated = _imitated(name, params, change or (lambda context: context))
+    shown = params.methods[name].shown
+    contexts = draw_contexts(params, shown.contexts, params.imitation.runs)
+    every = settings(name, params, [change(context) for context in contexts] if change else contexts)
     numbers = groups_of(params.imitation.runs, params.imitation.group)
-    values, files = _origin(name, params, sources)
+    values, files = origin(name, params, sources)
     tasks: list[tuple[Any, ...]] = []
     acted: list[Context] = []
     tables = []
-    for choice, contexts, clips in imitated:
+    for setting in every:
         for group in numbers:
             runs = [len(acted) + run for run in group]
             scratch = checkpoint_folder([*values, len(tasks)], files)
-            theirs = [contexts[run] for run in group]
-            frames = clips.frames[group] if own else clips.frames
-            tasks.append((name, params, method, runs, theirs, frames, scratch))
-        acted += contexts
-        table = pd.DataFrame({"clip": clips.names} | ({"choice": choice} if choice else {}))
-        if own:
-            table["context"] = np.repeat(np.arange(len(contexts)), params.imitation.demonstrations)
+            tasks.append((name, params, method, runs, *setting.of(group), scratch))
+        acted += setting.contexts
+        table = pd.DataFrame({"clip": setting.clips.names} | setting.named())
+        if shown.own_clips:
+            table["context"] = np.repeat(np.arange(params.imitation.runs), params.imitation.demonstrations)
         tables.append(table)
     results = list(run_tasks(evaluate_group, tasks))
     runs = pd.concat([result.runs for result in results], ignore_index=True)
     curve = pd.concat([result.curve for result in results], ignore_index=True)
-    if len(imitated) > 1:
+    named = pd.DataFrame([setting.named() for setting in every])
+    if len(named.columns):
         runs.insert(1, "context", runs["run"] % params.imitation.runs)
-        runs.insert(2, "choice", [context.choice.colour for context in acted if context.choice])
+        for place, column in enumerate(named, 2):
+            runs.insert(place, column, np.repeat(named[column].to_numpy(), params.imitation.runs))
     with whole_folder(paths.policies(name)) as output:
         write_atomically(output / "demonstrations.csv", pd.concat(tables).to_csv(index=False))
         write_atomically(output / "runs.csv", runs.to_csv(index=False))
@@ -106,16 +127,18 @@ def draw_contexts(params: Params, name: str, count: int) -> list[Context]:
     return sample_contexts(rng, count, kind, task)[0]
 
 
-def _imitated(
-    name: str, params: Params, change: Callable[[Context], Context]
-) -> list[tuple[Colour | None, list[Context], Clips]]:
-    """For each choice, or the only task: the contexts to act in and the clips that are imitated there."""
-    cell = params.methods[name]
-    contexts = [
-        change(context) for context in draw_contexts(params, cell.shown.contexts, params.imitation.runs)
-    ]
+def settings(name: str, params: Params, contexts: list[Context]) -> list[Setting]:
+    """What cell ``name`` is shown in ``contexts``.
 
-    def clips(choice: Colour | None = None) -> Clips:
+    One setting; or where clips choose between two goals, or are chosen by their angle, one for each of these.
+    """
+    cell = params.methods[name]
+    choices: tuple[Colour | None, ...] = COLOURS if two_goals(params) else (None,)
+    angles: Sequence[int | None] = cell.shown.angles or (None,)
+
+    def clips(choice: Colour | None, angle: int | None) -> Clips:
+        if angle is not None:
+            return angled_demonstrations(params, contexts, angle, choice)
         if cell.shown.own_clips:
             return own_demonstrations(params, len(contexts), choice)
         if cell.shown.other_experts:
@@ -123,12 +146,19 @@ def _imitated(
         clock = cell.reward == "clock"
         return clock_clips(params) if clock else imitated_demonstrations(params, choice)
 
-    if not two_goals(params):
-        return [(None, contexts, clips())]
-    return [(choice, [context.choosing(choice) for context in contexts], clips(choice)) for choice in COLOURS]
+    return [
+        Setting(
+            [context.choosing(choice) if choice else context for context in contexts],
+            clips(choice, angle),
+            choice,
+            angle,
+        )
+        for angle in angles
+        for choice in choices
+    ]
 
 
-def _origin(name: str, params: Params, sources: Sequence[Path]) -> tuple[list[Any], list[Path]]:
+def origin(name: str, params: Params, sources: Sequence[Path]) -> tuple[list[Any], list[Path]]:
     """The values and files that the checkpoints of a cell depend on."""
     values = params.model_dump(include={"base", "sim", "imitation", "adversarial"})
     for block in ("imitation", "adversarial"):

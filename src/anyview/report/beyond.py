@@ -12,10 +12,14 @@ from anyview.analysis.beyond import BeyondResults
 from anyview.analysis.cells import HUMAN, label
 from anyview.analysis.choice import CHOICE, choosing
 from anyview.analysis.clips import curves
+from anyview.analysis.ranking import failures
 from anyview.analysis.study import EvaluatedMethod, SimulatedSet, Study
 from anyview.analysis.tasks import by_task
+from anyview.analysis.viewpoints import SUCCESS, angles
+from anyview.config import BeyondCell
 from anyview.report.figures import choice, clips
 from anyview.report.figures.style import to_svg
+from anyview.report.figures.viewpoints import angle_curves
 from anyview.report.formatting import centimetres
 from anyview.report.illustrations import Illustrations, typical_strip
 from anyview.report.pictures import Clip, Strip, animated_webp, label_view, make_clip, make_strip
@@ -34,6 +38,8 @@ def illustrate_beyond(study: Study, results: BeyondResults) -> Illustrations:
     figures = {"choices": to_svg(choice.choices(results.choices))} if len(results.choices) else {}
     if len(results.clips):
         figures["clips"] = to_svg(clips.clip_curves(results.clips, _clip_curves(study, results)))
+    if len(results.viewpoints):
+        figures["viewpoints"] = to_svg(angle_curves(results.viewpoints))
     strips = {f"translations-{cell}": typical_strip(entry) for cell, entry in study.translators.items()}
     moving = {}
     if CHOICE in study.methods and CHOICE in study.simulated:
@@ -129,6 +135,10 @@ def write_beyond(
             against_choice=list(results.against_choice.itertuples()),
             clips=by_cell(results.clips),
             frames_of=partial(_frames_of, study),
+            viewpoints=by_cell(results.viewpoints),
+            angles=partial(_angles, results),
+            rewards=by_cell(results.rewards),
+            kinds=failures(results.rewards),
             imitation=by_cell(results.others.imitation),
             differences={row.cell: row for row in results.others.differences.itertuples()},
             tasks={task: list(methods) for task, methods in by_task(study).items()},
@@ -151,9 +161,16 @@ def _clip_curves(study: Study, results: BeyondResults) -> list[tuple[str, dict[s
 
 def _frames_of(study: Study, cell: str) -> str:
     """Which frames of its clips a method has."""
-    incomplete = study.params.beyond.cells[cell].incomplete
+    method = study.params.beyond.cells[cell]
+    assert isinstance(method, BeyondCell)
+    incomplete = method.incomplete
     kept = "all" if incomplete.every == 1 else f"1 in {incomplete.every}"
     return kept if incomplete.until == 1 else f"first {incomplete.until:.0%}"
+
+
+def _angles(results: BeyondResults, cell: str) -> list[str]:
+    """The angles between the cameras at which a method was run, in degrees."""
+    return [f"{angle:g}" for angle in angles(results.viewpoints, cell, SUCCESS)["angle"]]
 
 
 def _rollouts(study: Study) -> Iterator[tuple[str, list[Clip]]]:

@@ -75,7 +75,10 @@ def _context(study: Study, results: Results) -> dict[str, Any]:
     """Tables as the templates read them, and which cells each chapter names."""
     imitation = study.params.imitation
     return {
-        **{name: by_cell(getattr(results, name)) for name in ("data", "translation", "imitation", "more")},
+        **{
+            name: by_cell(getattr(results, name))
+            for name in ("data", "translation", "imitation", "more", "viewpoints")
+        },
         **{
             name: list(getattr(results, name).itertuples())
             for name in ("loss_points", "optimizers", "weight_ranges", "differences", "effects")

@@ -5,7 +5,7 @@ from typing import TypeVar
 import numpy as np
 
 from anyview import paths
-from anyview.config import DemonstrationCell, EmbeddingRewardCell
+from anyview.config import DemonstrationCell, EmbeddingRewardCell, GoalCell
 from anyview.embedding.network import Embedding
 from anyview.embedding.weights import load_embedding
 from anyview.evaluation.methods import Group, Scoring, first_demonstration
@@ -18,6 +18,7 @@ from anyview.rewards.demonstration import (
     true_demonstrations,
 )
 from anyview.rewards.embedding import EmbeddingReward
+from anyview.rewards.goal import GoalReward
 from anyview.runtime.device import torch_device
 from anyview.runtime.errors import AnyviewError
 from anyview.translator.architectures import Translator
@@ -30,6 +31,8 @@ def make_reward(group: Group) -> Scoring:
     """The cell's reward. Raises AnyviewError if its model was trained on frames of another size."""
     if isinstance(group.cell, EmbeddingRewardCell):
         return _embedded(group, group.cell)
+    if isinstance(group.cell, GoalCell):
+        return _ending(group, group.cell)
     assert isinstance(group.cell, DemonstrationCell)
     return _demonstrated(group, group.cell)
 
@@ -52,6 +55,13 @@ def _embedded(group: Group, cell: EmbeddingRewardCell) -> Scoring:
     """The distance to the demonstrations in a time-contrastive embedding, which nothing translates."""
     model = _fitting(load_embedding(paths.model(cell.model)), cell.model, group.params.sim.image_size)
     reward = EmbeddingReward(model, group.demonstrations, group.own[:, 0], cell.time_power)
+    return Scoring(reward, reward.scales, first_demonstration(group), fixed=True)
+
+
+def _ending(group: Group, cell: GoalCell) -> Scoring:
+    """The distance to how demonstrations end, in an embedding by cycles."""
+    model = _fitting(load_embedding(paths.model(cell.model)), cell.model, group.params.sim.image_size)
+    reward = GoalReward(model, group.demonstrations, group.own[:, 0])
     return Scoring(reward, reward.scales, first_demonstration(group), fixed=True)
 
 

@@ -1,5 +1,6 @@
 """The card of a model folder: what it holds, at which scale it was made, how good it is, how to use it."""
 
+import inspect
 import json
 from pathlib import Path
 
@@ -8,9 +9,10 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from anyview.analysis.estimates import Estimate, Estimator, proportion
 from anyview.analysis.study import EvaluatedMethod
-from anyview.pusher.task import PUSH, load_task
+from anyview.learners.common.policies import load_policy
+from anyview.pusher.task import load_task
 from anyview.review.results import flat
-from anyview.sharing.checksums import CARD
+from anyview.sharing.checksums import CARD, POLICIES
 from anyview.sharing.folder import Lock
 
 
@@ -31,6 +33,7 @@ def write_card(
     success = proportion(int(runs["success"].sum()), len(runs))
     distances = runs["final_distance"].to_numpy(float)
     distance = Estimator(int(params.get("base.seed", 0))).median(f"{method}/final_distance", distances)
+    task = load_policy(folder / POLICIES, run).context.task
     metrics = {"success rate": success, "median final distance, cm": _scaled(distance, 100)}
     data = ModelCardData(
         license=licence,
@@ -41,8 +44,8 @@ def write_card(
         eval_results=[
             EvalResult(
                 task_type="robotics",
-                dataset_type="anyview-pusher",
-                dataset_name=f"Anyview's pusher, {len(runs)} runs",
+                dataset_type=f"anyview-{task}",
+                dataset_name=f"Anyview's task {task}, {len(runs)} runs",
                 metric_type=metric,
                 metric_value=round(estimate.value, 4),
             )
@@ -56,16 +59,24 @@ def write_card(
         data=data.to_yaml(),
         repo=repo,
         method=method,
+        task=task,
+        aim=_aim(task),
         runs=len(runs),
         run=run,
         filmed=100 * runs.set_index("run")["final_distance"][run],
-        tolerance=100 * load_task(PUSH).tolerance,
+        tolerance=100 * load_task(task).tolerance,
         metrics=metrics,
         params={key: json.dumps(value) for key, value in params.items()},
         licence=licence,
         stages=list(lock),
     )
     (folder / CARD).write_text(text, encoding="utf-8")
+
+
+def _aim(task: str) -> str:
+    """What the module of ``task`` says first, behind its name: one sentence, or nothing."""
+    said = " ".join((inspect.getdoc(inspect.getmodule(type(load_task(task)))) or "").split())
+    return said.removeprefix(f"{task.capitalize()}: ").partition(". ")[0].rstrip(".")
 
 
 def _scaled(estimate: Estimate, factor: float) -> Estimate:

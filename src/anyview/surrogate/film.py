@@ -50,7 +50,8 @@ def film(folder: Path, demonstration: Demonstration, width: int, seed: int) -> l
     """Film a demonstration into ``folder``, unless an earlier try finished it; returns its manifest rows.
 
     Each camera leaves ``<clip>.avi`` (XVID) and ``<clip>.times.csv``, the second at which each
-    frame was taken, on one clock for both cameras.
+    frame was taken, on one clock for both cameras. The manifest's ``azimuth`` is where it stands around the
+    table, in degrees.
     """
 
     def make() -> tuple[list[dict[str, str]], list[str]]:
@@ -84,7 +85,9 @@ def _film(folder: Path, demonstration: Demonstration, width: int, seed: int) -> 
             for time in times:
                 video.write(webcam.expose(scene.render(index, time), time))
         pd.DataFrame({"seconds": times.round(4)}).to_csv(folder / times_file(file), index=False)
-        rows.append({"file": file, "pair": demonstration.pair, "camera": camera, "kind": kind})
+        row = {"file": file, "pair": demonstration.pair, "camera": camera, "kind": kind}
+        azimuth = f"{np.degrees(views[index].azimuth) % 360:.1f}"
+        rows.append(row | {"azimuth": azimuth})
     scene.close()
     return rows
 

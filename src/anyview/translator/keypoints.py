@@ -29,6 +29,7 @@ _CHANNELS = 16, 32, 64  # of the maps at a half, a quarter and an eighth of the 
 _HIDDEN = 256
 _STRIDE = 8
 _OUTSIDE = 1.1  # where what is outside of the picture counts as being
+_LEAST_WAY = 0.1  # between two keypoints, so that the same place twice is no division by nothing
 _COPIED = 5.0  # added to the mask of what stands still, so that at first most is copied
 _SHIFTING = [0]  # keypoints that carry the first frame along: the object, see video/marks.py
 _TURNING = [2, 3]  # those from which lines do: from the tool to the wrist, and on to the elbow
@@ -64,7 +65,8 @@ class KeypointEncoder(nn.Module):
         self.look = nn.Conv2d(fine, _LOOK - 3, 1)
         self.vector = nn.Linear(coarse, _VECTOR)
 
-    def forward(self, frames: Tensor) -> Seen:
+    def forward(self, frames: Tensor, marks: Tensor | None = None) -> Seen:
+        """With ``marks`` (N, M, 2) looks are of what is there, not where the first M keypoints are found."""
         fine, middle, coarse = self._shrink(frames)
         x = self.deep(coarse)
         pooled = x.mean((2, 3))
@@ -75,7 +77,10 @@ class KeypointEncoder(nn.Module):
         where = heat.unflatten(2, x.shape[2:])
         axis = _axis(x)
         places = torch.stack(((where.sum(2) * axis).sum(-1), (where.sum(3) * axis).sum(-1)), -1)
-        strokes = _strokes(places.detach(), x).flatten(2)
+        looked_at = places.flatten(1).detach()
+        if marks is not None:
+            looked_at = with_places(looked_at, marks)
+        strokes = _strokes(_places(looked_at), x).flatten(2)
         seen = torch.cat((F.avg_pool2d(frames, 2), self.look(x)), 1)
         looks = F.normalize(strokes, p=1, dim=-1, eps=1.0) @ seen.flatten(2).transpose(1, 2).float()
         return Seen(torch.cat((places.flatten(1), self.vector(pooled), looks.flatten(1)), 1), x)
@@ -93,11 +98,16 @@ class KeypointTranslation(nn.Module):
 
     Each goes to a weighted sum of all their places, and a step beside it. So "half of the way from the object
     to the target" is one set of weights for all contexts and points of view.
+
+    If ``relative``, T is also told where the keypoints are on the way from the first to the second in the
+    first frames: "half of the way" is a quotient of distances, which layers learn slowly.
     """
 
-    def __init__(self, width: int):
+    def __init__(self, width: int, relative: bool = False):
         super().__init__()
-        self.hidden = nn.ModuleList([nn.Linear(3 * width, _HIDDEN), nn.Linear(_HIDDEN, _HIDDEN)])
+        self.relative = relative
+        inputs = 3 * (width + 2 * KEYPOINTS * relative)
+        self.hidden = nn.ModuleList([nn.Linear(inputs, _HIDDEN), nn.Linear(_HIDDEN, _HIDDEN)])
         self.weights = nn.Linear(_HIDDEN, KEYPOINTS**2)
         self.steps = nn.Linear(_HIDDEN, width)
         with torch.no_grad():  # at first all stay where they are
@@ -107,6 +117,9 @@ class KeypointTranslation(nn.Module):
 
     def forward(self, z1: Tensor, z2: Tensor, first: Tensor) -> Tensor:
         x = torch.cat((z1, z2, first), dim=1)
+        if self.relative:
+            on_way = [relative_places(*pair) for pair in ((z1, first), (first, first), (z2, z2))]
+            x = torch.cat((x, *on_way), dim=1)
         for layer in self.hidden:
             x = activate(layer(x))
         mixed = self.weights(x).unflatten(1, (KEYPOINTS, KEYPOINTS)) @ _places(z2)
@@ -203,14 +216,21 @@ class KeypointTranslator(nn.Module):
         self.translation = KeypointTranslation(self.width)
         self.decoder = KeypointDecoder()
 
-    def encode_expert(self, frames: Tensor, noise: Generator | None = None) -> Tensor:
-        """z1 (N, width) of ``frames`` (N, 3, H, W) in [-1, 1]."""
-        return self.encoder(frames).code
+    def encode_expert(
+        self, frames: Tensor, noise: Generator | None = None, marks: Tensor | None = None
+    ) -> Tensor:
+        """z1 (N, width) of ``frames`` (N, 3, H, W) in [-1, 1], with looks at ``marks`` (N, M, 2) if given."""
+        return self.encoder(frames, marks).code
 
-    def encode_context(self, frames: Tensor, noise: Generator | None = None) -> tuple[Tensor, list[Tensor]]:
-        """z2 (N, width) of first frames (N, 3, H, W), and what the decoder needs beside codes."""
-        code, finest = self.encoder(frames)
-        return code, [frames, code, finest]
+    def encode_context(
+        self, frames: Tensor, noise: Generator | None = None, marks: Tensor | None = None
+    ) -> tuple[Tensor, list[Tensor]]:
+        """z2 (N, width) of first frames (N, 3, H, W), and what the decoder needs beside codes.
+
+        With ``marks`` (N, M, 2), where things are, that is carried along and painted over from there.
+        """
+        code, finest = self.encoder(frames, marks)
+        return code, [frames, code if marks is None else with_places(code, marks), finest]
 
     def task_frames(self, length: int) -> np.ndarray:
         """Steps of a clip of ``length`` frames whose code T is given beside the present one: the first."""
@@ -230,6 +250,30 @@ class KeypointTranslator(nn.Module):
     def decode(self, z: Tensor, skips: list[Tensor]) -> Tensor:
         """Dec: frames (N, 3, H, W) of z (N, width) and skips of C contexts, row n in context n modulo C."""
         return self.decoder(z, self.decoder.skip_terms(skips))
+
+
+class RelativeKeypointTranslator(KeypointTranslator):
+    """The same, whose T is told relative places: its first two keypoints must be taught what they are."""
+
+    architecture = "keypoint-relative"
+
+    def __init__(self, image_size: int):
+        super().__init__(image_size)
+        self.translation = KeypointTranslation(self.width, relative=True)
+
+
+def relative_places(codes: Tensor, first: Tensor) -> Tensor:
+    """Places (N, 2 K) of ``codes`` along and beside the way from the first to the second of ``first``'s.
+
+    In units of that way: the same for all points of view from above, and for all sizes. Those more than three
+    ways off count as that far.
+    """
+    start, end = _places(first)[:, :2].split(1, dim=1)  # (N, 1, 2) each
+    way, offsets = end - start, _places(codes) - start
+    square = way.square().sum(-1).clamp_min(_LEAST_WAY**2)
+    along = (offsets * way).sum(-1) / square
+    beside = (way[..., 0] * offsets[..., 1] - way[..., 1] * offsets[..., 0]) / square
+    return torch.stack((along, beside), -1).flatten(1).clamp(-3, 3)
 
 
 def place_loss(codes: Tensor, marks: Tensor) -> Tensor:

@@ -7,7 +7,6 @@ import numpy as np
 
 from anyview.runtime.errors import AnyviewError
 from anyview.video.datasets import Dataset, clip_pairs
-from anyview.video.places import find_object
 
 
 @dataclass(frozen=True)
@@ -45,28 +44,19 @@ class FramePairs:
     def marks(self, dataset: Dataset) -> tuple[np.ndarray, np.ndarray] | None:
         """The marks of ``frames`` (2N, M, 2) and of ``contexts`` (N, M, 2), in pixels, if the set has any.
 
-        Where experts of another set have them, the own clips' first two are seen: the object, and the target
-        as where it ends. What is not known or not seen is NaN.
+        Marks of other experts' clips are NaN if their set has none.
         """
-        if dataset.experts:
-            return self._seen_marks(dataset, dataset.experts)
         if dataset.marks is None:
             return None
-        clips = np.concatenate((self.sources, self.targets))
-        times = np.concatenate((self.times, self.times))
-        return dataset.marks[clips, times], dataset.marks[self.targets, 0]
-
-    def _seen_marks(self, dataset: Dataset, experts: Dataset) -> tuple[np.ndarray, np.ndarray]:
-        of_experts = np.full((len(self), 2, 2), np.nan, np.float32)
-        if experts.marks is not None:
-            scale = dataset.image_size / experts.image_size
-            of_experts = scale * (experts.marks[self.sources, self.times] + 0.5) - 0.5
-        steps = dataset.steps(self.sources, self.times)
-        of_targets, of_contexts = np.full((2, *of_experts.shape), np.nan, np.float32)
-        for n, (clip, step) in enumerate(zip(self.targets, steps, strict=True)):
-            first, now, last = (find_object(dataset.frames[clip, at]) for at in (0, step, -1))
-            of_targets[n, :2], of_contexts[n, :2] = (now, last), (first, last)
-        return np.concatenate((of_experts, of_targets)), of_contexts
+        of_targets = dataset.marks[self.targets, dataset.steps(self.sources, self.times)]
+        experts = dataset.experts or dataset
+        if experts.marks is None:
+            of_experts = np.full_like(of_targets, np.nan)
+        else:
+            of_experts = experts.marks[self.sources, self.times]
+            if experts.image_size != dataset.image_size:
+                of_experts = dataset.image_size / experts.image_size * (of_experts + 0.5) - 0.5
+        return np.concatenate((of_experts, of_targets)), dataset.marks[self.targets, 0]
 
     def contexts(self, dataset: Dataset) -> np.ndarray:
         """o_0^j, uint8 (N, H, W, 3); of pairs of one frame each."""

@@ -5,21 +5,20 @@ import time
 from collections.abc import Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, Self, TypeVar
 
 import numpy as np
 import pandas as pd
 import torch
 from torch import Tensor, nn
 
-from anyview.config import EmbeddingCell, Training, TranslatorCell
+from anyview.config import CycleCell, EmbeddingCell, Training, TranslatorCell
 from anyview.runtime.checkpoints import Checkpoints
 from anyview.runtime.device import torch_device, use_threads
 from anyview.runtime.errors import AnyviewError
 from anyview.runtime.outputs import whole_folder, write_atomically
 from anyview.runtime.progress import track
 from anyview.runtime.scratch import checkpoint_folder
-from anyview.training.common.batches import FramePairs
 from anyview.training.common.optimization import MakeOptimizer, SharedOptimizer, learning_rate
 from anyview.video.datasets import dataset_files
 
@@ -35,11 +34,26 @@ Row = dict[str, float]
 State = dict[str, Tensor]
 
 
-class Objective(Protocol):
+class Batch(Protocol):
+    """What an update learns from."""
+
+    def __len__(self) -> int:
+        """How many pairs."""
+        ...
+
+    def parts(self, count: int) -> list[Self]:
+        """The pairs in ``count`` runs of about equal length, fewer if there are fewer pairs."""
+        ...
+
+
+B = TypeVar("B", bound=Batch)
+
+
+class Objective(Protocol[B]):
     """What a network is trained for. What is random in an iteration follows from its index alone."""
 
     @property
-    def cell(self) -> TranslatorCell | EmbeddingCell:
+    def cell(self) -> TranslatorCell | EmbeddingCell | CycleCell:
         """Its data set, its iterations, and what else its kind has."""
         ...
 
@@ -72,19 +86,19 @@ class Objective(Protocol):
         """A new network on the CPU, with the weights that every training of the seed starts from."""
         ...
 
-    def batch(self, iteration: int) -> FramePairs:
+    def batch(self, iteration: int) -> B:
         """The batch of an iteration."""
         ...
 
-    def losses(self, model: Any, pairs: FramePairs, iteration: int, part: int) -> Tensor:
+    def losses(self, model: Any, pairs: B, iteration: int, part: int) -> Tensor:
         """Means over ``pairs``, part number ``part`` of a batch: the loss to minimise, then others, (L,)."""
         ...
 
-    def validation(self) -> list[FramePairs]:
+    def validation(self) -> list[B]:
         """The fixed pairs to validate on, in parts that fit into memory."""
         ...
 
-    def validation_losses(self, model: Any, pairs: FramePairs) -> Tensor:
+    def validation_losses(self, model: Any, pairs: B) -> Tensor:
         """Means over ``pairs``, (V,)."""
         ...
 
@@ -97,7 +111,7 @@ class Objective(Protocol):
         ...
 
 
-def fit(name: str, objective: Objective, output: Path) -> None:
+def fit(name: str, objective: Objective[B], output: Path) -> None:
     """Train cell ``name`` into the model folder ``output``; continues an interrupted training bit for bit.
 
     The folder holds the weights of the least validation loss, their description, and ``curve.csv``. The curve
@@ -150,12 +164,12 @@ def fit(name: str, objective: Objective, output: Path) -> None:
 
 
 def update(
-    objective: Objective, model: nn.Module, optimizer: SharedOptimizer, iteration: int, pool: Executor
+    objective: Objective[B], model: nn.Module, optimizer: SharedOptimizer, iteration: int, pool: Executor
 ) -> Tensor:
     """One update of ``model`` by the iteration's batch; returns the batch's losses (L,)."""
     batch, parameters = objective.batch(iteration), list(model.parameters())
 
-    def gradients(part: int, pairs: FramePairs) -> tuple[Tensor, tuple[Tensor | None, ...]]:
+    def gradients(part: int, pairs: B) -> tuple[Tensor, tuple[Tensor | None, ...]]:
         """Losses and gradients of one part of the batch, weighted by its fraction of the batch."""
         losses = objective.losses(model, pairs, iteration, part) * (len(pairs) / len(batch))
         return losses.detach(), torch.autograd.grad(losses[0], parameters, allow_unused=True)
@@ -166,11 +180,11 @@ def update(
     return torch.stack([losses for losses, _ in found]).sum(0)
 
 
-def validate(objective: Objective, model: nn.Module, parts: list[FramePairs], pool: Executor) -> Tensor:
+def validate(objective: Objective[B], model: nn.Module, parts: list[B], pool: Executor) -> Tensor:
     """Mean validation losses over all pairs of ``parts``, float64 (V,) on the CPU."""
 
     @torch.no_grad()  # the mode is each thread's own
-    def sums(pairs: FramePairs) -> Tensor:
+    def sums(pairs: B) -> Tensor:
         return objective.validation_losses(model, pairs) * len(pairs)
 
     return torch.stack(list(pool.map(sums, parts))).sum(0).double().cpu() / sum(map(len, parts))
@@ -183,7 +197,7 @@ def _diverged(row: Row, rows: list[Row]) -> bool:
 
 
 def _keep_last_good(
-    name: str, objective: Objective, row: Row, rows: list[Row], best: State, scratch: Path
+    name: str, objective: Objective[B], row: Row, rows: list[Row], best: State, scratch: Path
 ) -> str:
     """Save the best weights so far, if there are any; returns what to tell the user."""
     problem = (
@@ -198,7 +212,7 @@ def _keep_last_good(
     return f"{problem}; the best weights until then, of iteration {_best_iteration(rows)}, are in {kept}"
 
 
-def _save(folder: Path, name: str, objective: Objective, best: State, rows: list[Row]) -> None:
+def _save(folder: Path, name: str, objective: Objective[B], best: State, rows: list[Row]) -> None:
     """Write a model folder of the ``best`` weights."""
     cell = objective.cell
     meta = {"cell": name, "dataset": cell.dataset, "iterations": cell.iterations}

@@ -1,0 +1,1 @@
+"""Whether rewards follow progress and rank failures below successes, by scripted rollouts."""

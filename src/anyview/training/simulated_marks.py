@@ -1,0 +1,80 @@
+"""Where things are in simulated clips, by the camera's projection: nothing is rendered, nothing searched for.
+
+Of a clip its manifest has the context. All that moves in it follows from that: the expert acts there again.
+"""
+
+import numpy as np
+
+from anyview import paths
+from anyview.pusher.contexts import Context
+from anyview.pusher.expert import roll_out
+from anyview.pusher.scene import (
+    ARENA_CENTRE,
+    CAMERA_DISTANCE,
+    CAMERA_ELEVATION,
+    CAMERA_FOVY,
+    FINGER_HEIGHT,
+    LINK,
+)
+from anyview.pusher.task import load_task
+from anyview.runtime.errors import AnyviewError
+from anyview.trigonometry import unit_vector
+from anyview.video.datasets import Dataset
+
+_AT_ONCE = 500  # clips
+
+
+def simulated_marks(dataset: Dataset) -> np.ndarray:
+    """Of each frame of a simulated set the marks that rendered scenes have, float32 (N, 50, 5, 2) in pixels.
+
+    These are object, target, tool, and for wrist and elbow the arm's last two joints: instead of one outside
+    of the picture the place where the arm leaves it. Raises AnyviewError if the manifest tells no contexts.
+    """
+    if "context" not in dataset.clips:
+        manifest = paths.clip_set(dataset.name) / "manifest.csv"
+        raise AnyviewError(f"{manifest}: no column context; run the simulate stage again")
+    contexts = [Context.from_json(text) for text in dataset.clips["context"]]
+    marks = np.empty((*dataset.frames.shape[:2], 5, 2), np.float32)
+    for first in range(0, len(contexts), _AT_ONCE):
+        some = contexts[first : first + _AT_ONCE]
+        azimuths = np.array([context.azimuth for context in some])
+        seen = project(_points(some), azimuths[:, None, None])
+        for joint in (3, 4):
+            seen[..., joint, :] = _leaving(seen[..., joint - 1, :], seen[..., joint, :])
+        marks[first : first + _AT_ONCE] = seen
+    return 0.5 * dataset.image_size * (marks + 1.0) - 0.5
+
+
+def project(points: np.ndarray, azimuths: np.ndarray) -> np.ndarray:
+    """Where cameras at ``azimuths`` (...) in radians see ``points`` (..., 3) in metres: x and y (..., 2).
+
+    From -1 to 1 in the picture, y downwards.
+    """
+    ahead, across = unit_vector(azimuths), unit_vector(azimuths - np.pi / 2)
+    level, drop = unit_vector(np.deg2rad(CAMERA_ELEVATION))
+    flat, height = points[..., :2] - ARENA_CENTRE, points[..., 2]
+    forward = (flat * ahead).sum(-1)
+    depth = CAMERA_DISTANCE + level * forward + drop * height
+    right, up = (flat * across).sum(-1), level * height - drop * forward
+    return np.stack([right, -up], -1) / (np.tan(np.deg2rad(CAMERA_FOVY) / 2) * depth)[..., None]
+
+
+def _leaving(inside: np.ndarray, outside: np.ndarray) -> np.ndarray:
+    """Where the ways from ``inside`` to ``outside`` leave the picture; either may be the other. (..., 2)."""
+    way = outside - inside
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = np.where(way == 0, np.inf, (np.sign(way) - inside) / way).min(-1, keepdims=True)
+    return inside + way * reach.clip(0, 1)
+
+
+def _points(contexts: list[Context]) -> np.ndarray:
+    """The marked points (N, 50, 5, 3) along the expert's way, in metres."""
+    positions, _ = roll_out(contexts)
+    links = LINK * unit_vector(np.cumsum(positions[..., :3], axis=-1))
+    elbow, wrist, tool = np.moveaxis(np.cumsum(links, axis=-2), -2, 0)
+    goals = np.array([context.goal_xy for context in contexts])
+    target = np.broadcast_to(goals[:, None], tool.shape)
+    flat = np.stack([positions[..., 3:5], target, tool, wrist, elbow], axis=-2)
+    above = load_task(contexts[0].task).model("twist").body("link0").pos[2]
+    heights = (FINGER_HEIGHT, 0.0, FINGER_HEIGHT, above, above)
+    return np.concatenate([flat, np.broadcast_to(np.array(heights)[:, None], (*flat.shape[:-1], 1))], axis=-1)

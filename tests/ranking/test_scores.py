@@ -1,0 +1,36 @@
+"""Returns and values of clips, against one frame at a time; a reward that looks back sees what it should."""
+
+import numpy as np
+
+from anyview.adversarial.tpil import tpil_reward
+from anyview.config import RewardWeights, load_params
+from anyview.ranking.scores import rewards, values
+from anyview.rewards.demonstration import DemonstrationReward, translate_demonstrations
+from anyview.video.pixels import to_input
+from tests.learners.toy import clip_set
+
+
+def test_a_value_is_the_last_steps_reward_of_the_frame_alone(translator, expert_clips):
+    first = expert_clips[3:, 0]
+    targets = translate_demonstrations(translator, expert_clips[:3], first)
+    reward = DemonstrationReward(translator, *targets, first, RewardWeights(feature=1.0, image=1.0), 0.0)
+    clips = expert_clips[3:]
+    each = rewards(reward, clips[:, None])
+    assert each.shape == (2, 1, 49)
+    for step in (1, 17, 49):
+        np.testing.assert_array_equal(each[:, :, step - 1], reward.step(clips[:, None, step], step))
+    worth = values(reward, clips, [1, 20, 49])
+    for column, time in enumerate((1, 20, 49)):
+        np.testing.assert_allclose(worth[:, column], reward.step(clips[:, None, time], 49)[:, 0], rtol=1e-5)
+
+
+def test_a_reward_of_two_frames_is_given_both(expert_clips, root):
+    params = load_params(root / "params.yaml").adversarial.discriminator
+    clips = clip_set(expert_clips)
+    reward = tpil_reward(params, 0, [0, 1], [clips] * 2, [clips] * 2, 10)
+    worth = values(reward, expert_clips[3:], [10, 49])
+    for run, network in enumerate(reward.networks):
+        features = network.features(to_input(expert_clips[3 + run][[7, 10, 46, 49]]))
+        logits = [network._logits(before[None], now[None]) for before, now in features.view(2, 2, -1)]
+        expected = [network.reward(logit).item() for logit in logits]
+        np.testing.assert_allclose(worth[run], expected, rtol=1e-5)
