@@ -44,6 +44,9 @@ class GoalReward:
         """Nothing to learn or log."""
         return {}
 
+    def rescored(self) -> None:
+        """It never changes."""
+
     def state(self) -> Arrays:
         """Nothing beyond what it is made from."""
         return {}
