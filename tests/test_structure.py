@@ -249,7 +249,7 @@ def test_the_study_knows_nothing_of_the_evidence_and_this_plans_every_seed():
             sets, diversity.demonstrations, diversity.seeds, EVALUATIONS
         )
     }
-    models = {policy.rsplit("-", 1)[0] for policy in policies}
+    models = {found[0] for policy in policies if (found := re.match(r".*-seed-\d+", policy))}
     for cells, trained in (
         (policies, headline.cells),
         (models, [headline.translator, headline.embedding]),
