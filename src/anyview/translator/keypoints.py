@@ -65,8 +65,7 @@ class KeypointEncoder(nn.Module):
         self.look = nn.Conv2d(fine, _LOOK - 3, 1)
         self.vector = nn.Linear(coarse, _VECTOR)
 
-    def forward(self, frames: Tensor, marks: Tensor | None = None) -> Seen:
-        """With ``marks`` (N, M, 2) looks are of what is there, not where the first M keypoints are found."""
+    def forward(self, frames: Tensor) -> Seen:
         fine, middle, coarse = self._shrink(frames)
         x = self.deep(coarse)
         pooled = x.mean((2, 3))
@@ -77,10 +76,7 @@ class KeypointEncoder(nn.Module):
         where = heat.unflatten(2, x.shape[2:])
         axis = _axis(x)
         places = torch.stack(((where.sum(2) * axis).sum(-1), (where.sum(3) * axis).sum(-1)), -1)
-        looked_at = places.flatten(1).detach()
-        if marks is not None:
-            looked_at = with_places(looked_at, marks)
-        strokes = _strokes(_places(looked_at), x).flatten(2)
+        strokes = _strokes(places.detach(), x).flatten(2)
         seen = torch.cat((F.avg_pool2d(frames, 2), self.look(x)), 1)
         looks = F.normalize(strokes, p=1, dim=-1, eps=1.0) @ seen.flatten(2).transpose(1, 2).float()
         return Seen(torch.cat((places.flatten(1), self.vector(pooled), looks.flatten(1)), 1), x)
@@ -216,21 +212,14 @@ class KeypointTranslator(nn.Module):
         self.translation = KeypointTranslation(self.width)
         self.decoder = KeypointDecoder()
 
-    def encode_expert(
-        self, frames: Tensor, noise: Generator | None = None, marks: Tensor | None = None
-    ) -> Tensor:
-        """z1 (N, width) of ``frames`` (N, 3, H, W) in [-1, 1], with looks at ``marks`` (N, M, 2) if given."""
-        return self.encoder(frames, marks).code
+    def encode_expert(self, frames: Tensor, noise: Generator | None = None) -> Tensor:
+        """z1 (N, width) of ``frames`` (N, 3, H, W) in [-1, 1]."""
+        return self.encoder(frames).code
 
-    def encode_context(
-        self, frames: Tensor, noise: Generator | None = None, marks: Tensor | None = None
-    ) -> tuple[Tensor, list[Tensor]]:
-        """z2 (N, width) of first frames (N, 3, H, W), and what the decoder needs beside codes.
-
-        With ``marks`` (N, M, 2), where things are, that is carried along and painted over from there.
-        """
-        code, finest = self.encoder(frames, marks)
-        return code, [frames, code if marks is None else with_places(code, marks), finest]
+    def encode_context(self, frames: Tensor, noise: Generator | None = None) -> tuple[Tensor, list[Tensor]]:
+        """z2 (N, width) of first frames (N, 3, H, W), and what the decoder needs beside codes."""
+        code, finest = self.encoder(frames)
+        return code, [frames, code, finest]
 
     def task_frames(self, length: int) -> np.ndarray:
         """Steps of a clip of ``length`` frames whose code T is given beside the present one: the first."""

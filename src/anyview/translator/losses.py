@@ -97,17 +97,13 @@ def batch_losses(
 
     Frames are in [-1, 1]. ``clip`` (N, K, 3, H, W) are ``task_frames`` of the expert's clips, if T is given a
     task embedding. With ``wanted`` only the losses whose weight is above 0 are computed; ``noise``
-    turns dropout on. With ``marks`` there is L_places, of a translator of keypoints, which looks at
-    the places that are marked and draws there. What the decoder makes of the skips is computed once for both
+    turns dropout on. With ``marks`` there is L_places, of a translator of keypoints, and L_tr is of what it
+    draws at the places that are marked. What the decoder makes of the skips is computed once for both
     decodings.
     """
     target = paired[len(context) :]
-    if marks is not None and isinstance(model, KeypointTranslator):
-        z1, z_true = model.encode_expert(paired, noise, marks.paired).chunk(2)
-        z2, skips = model.encode_context(context, noise, marks.context)
-    else:
-        z1, z_true = model.encode_expert(paired, noise).chunk(2)
-        z2, skips = model.encode_context(context, noise)
+    z1, z_true = model.encode_expert(paired, noise).chunk(2)
+    z2, skips = model.encode_context(context, noise)
     task = None
     if clip is not None:
         # Without gradients a batch takes a quarter longer than with no embedding, and not twice as long. Enc1
@@ -122,7 +118,7 @@ def batch_losses(
         found = place_loss(torch.cat((z1, z_true, z2)), torch.cat(marks))
         wanted_places = marks.paired[len(context) :]
         places = PLACE_SCALE * (found + place_loss(z3, wanted_places))
-        # Dec learns to draw from places and looks that are right. Those found at first teach it to blur.
+        # Dec learns to draw from the places that are right. Those found at first teach it to blur.
         drawn = with_places(z3, wanted_places)
 
     def decoding_loss(z: Tensor) -> Tensor:
