@@ -141,6 +141,15 @@ def test_a_name_that_is_no_task_is_refused(root: Path, outside: Path, monkeypatc
         AnyviewError, match=r"task hollow: .*anyview_hollow.py has no TASK, an instance of Task"
     ):
         load_task("hollow")
+    (outside / "anyview_half.py").write_text(
+        "from anyview.pusher.task import Task\n"
+        "class Half(Task):\n"
+        "    goal_radius = 0.1\n"
+        "    propose = expert_poses = distance = None\n"
+        "TASK = Half()\n"
+    )
+    with pytest.raises(AnyviewError, match=r"half: .*anyview_half.py: TASK lacks tolerance, tool, objects"):
+        load_task("half")
     for name in ("json", "push.numpy", "", "../push"):
         with pytest.raises(AnyviewError, match="no such module"):
             load_task(name)

@@ -87,13 +87,15 @@ def load_task(name: str) -> Task:
     """The task of ``anyview.tasks.<name>``, or else of a module of your own, ``anyview_<name>``.
 
     The prefix keeps files that name a task from importing anything else. AnyviewError if there is no such
-    task.
+    task, or if it lacks a part.
     """
     for module in (f"anyview.tasks.{name}", f"anyview_{name}") if name.isidentifier() else ():
         if (found := importlib.util.find_spec(module)) is not None:
             task = getattr(importlib.import_module(module), "TASK", None)
             if not isinstance(task, Task):
                 raise AnyviewError(f"task {name}: {found.origin} has no TASK, an instance of Task")
+            if missing := [key for key in Task.__annotations__ if not hasattr(task, key)]:
+                raise AnyviewError(f"task {name}: {found.origin}: TASK lacks {', '.join(missing)}")
             return task
     known = ", ".join(task_names())
     raise AnyviewError(f"task {name}: no such module; there are {known}, and those of modules anyview_<name>")
