@@ -3,13 +3,16 @@
 import json
 import math
 import shutil
+import sys
 import time
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from anyview.config import load_params
 from tests.long_stages import digests
+from tests.test_setup import steps
 
 BOUNDS = ("", "_low", "_high")
 
@@ -182,3 +185,26 @@ def test_another_clone_can_use_the_run_cache(smoke, tmp_path):
     other.run("dvc", "pull", "--run-cache", "--allow-missing")
     said = other.run("dvc", "repro", "--pull", "simulate@narrow")
     assert "Stage 'simulate@narrow' is cached" in said
+
+
+@pytest.mark.parametrize(("job", "said"), [("smoke", "## Anyview"), ("review", "## Anyview")])
+def test_the_workflow_scripts_run(smoke, tmp_path, job, said):
+    """The very text of the steps, but for the one that talks to GitHub."""
+    (smoke.folder / ".venv").unlink(missing_ok=True)
+    (smoke.folder / ".venv").symlink_to(Path(sys.executable).parents[1])
+    for stamp in (".setup-stamp", ".setup-stamp-dev", ".setup-stamp-graphics"):
+        (smoke.folder / stamp).touch()
+    summary = tmp_path / "summary.md"
+    head = smoke.run("git", "rev-parse", "HEAD").strip()
+    for script in steps(job):
+        if "gh pr comment" not in script:
+            smoke.run(
+                "bash",
+                "-e",
+                "-c",
+                script,
+                GITHUB_STEP_SUMMARY=str(summary),
+                BASE=head,
+                IMAGES="https://example.org",
+            )
+    assert said in summary.read_text()

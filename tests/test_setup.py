@@ -80,29 +80,6 @@ def test_the_workflow_and_ci_run_the_same_targets():
         subprocess.run(["make", "-n", target], cwd=ROOT, check=True, capture_output=True)
 
 
-@pytest.mark.parametrize(("job", "said"), [("smoke", "## Anyview"), ("review", "## Anyview")])
-def test_the_workflow_scripts_run(smoke, tmp_path, job, said):
-    """The very text of the steps, but for the one that talks to GitHub."""
-    (smoke.folder / ".venv").unlink(missing_ok=True)
-    (smoke.folder / ".venv").symlink_to(BIN.parent)
-    for stamp in (".setup-stamp", ".setup-stamp-dev", ".setup-stamp-graphics"):
-        (smoke.folder / stamp).touch()
-    summary = tmp_path / "summary.md"
-    head = smoke.run("git", "rev-parse", "HEAD").strip()
-    for script in steps(job):
-        if "gh pr comment" not in script:
-            smoke.run(
-                "bash",
-                "-e",
-                "-c",
-                script,
-                GITHUB_STEP_SUMMARY=str(summary),
-                BASE=head,
-                IMAGES="https://example.org",
-            )
-    assert said in summary.read_text()
-
-
 def test_the_same_opengl_packages_everywhere():
     named = {
         path: re.findall(
