@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from filelock import FileLock
+from hypothesis import settings
 
 from anyview.runtime.graphics import load_mujoco
 from tests.long_stages import LONG_STAGES, change, digests
@@ -23,6 +24,9 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 load_mujoco()
 # A shell that starts tests in the background makes them ignore Ctrl-C, and their children with them.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+# A machine may be busy, and where CI is set, as .ci/run does, hypothesis always tries the same examples.
+settings.register_profile("patient", deadline=None)
+settings.load_profile("patient")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

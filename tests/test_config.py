@@ -319,7 +319,7 @@ def test_further_mistakes_are_counted():
         parse_params(values)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(
     path=st.sampled_from(LEAVES),
     value=st.none()

@@ -35,7 +35,7 @@ def test_a_small_shift_shows_in_pairs_though_contexts_differ_widely():
     assert row.order == "farther"
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(st.integers(0, 2**32))
 def test_an_order_is_claimed_exactly_where_the_test_of_log_distances_is_below_5_percent(seed):
     other = np.abs(CONTEXT * np.exp(np.random.default_rng(seed).normal(0.15, 0.3, RUNS)))

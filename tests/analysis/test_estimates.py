@@ -5,7 +5,7 @@ from itertools import combinations, product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
@@ -15,7 +15,6 @@ from anyview.analysis.statistics import EXACT_PAIRS, holm, mcnemar_exact, sign_f
 NORMAL_97_5 = 1.959963984540054
 
 
-@settings(deadline=None)
 @given(st.integers(1, 60).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))))
 def test_wilson_bounds_solve_wilsons_equation(counts):
     """At a bound p, the observed rate lies exactly 1.96 standard errors (under p) away from p."""
@@ -31,7 +30,6 @@ def test_the_thesis_success_rates_overlap_widely():
     assert (round(low, 3), round(high, 3)) == (0.548, 0.930)
 
 
-@settings(deadline=None)
 @given(st.lists(st.tuples(st.booleans(), st.booleans()), min_size=1, max_size=9))
 def test_mcnemar_counts_the_outcomes_at_least_as_rare(pairs):
     first, second = np.array(pairs).T
@@ -48,7 +46,6 @@ def test_twelve_against_seven_of_fifteen_is_not_significant():
     assert mcnemar_exact(ours, other) == pytest.approx(2 * 0.5**5)
 
 
-@settings(deadline=None)
 @given(st.lists(st.integers(-20, 20), min_size=1, max_size=10))
 def test_sign_flips_are_counted_one_by_one(whole):
     """With ties, which whole numbers have many of. In sevenths, so that no sum is exact."""
@@ -86,7 +83,6 @@ def test_many_pairs_take_the_normal_limit_which_the_count_is_close_to(shift):
     assert sign_flip_test(doubled) == pytest.approx(expected)
 
 
-@settings(deadline=None)
 @given(st.lists(st.floats(0, 1), min_size=1, max_size=7))
 def test_holm_is_the_closed_test_of_bonferroni(p_values):
     """A contrast counts if in every set of contrasts that it is in, the least p times their number does."""

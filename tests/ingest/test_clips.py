@@ -79,7 +79,7 @@ def test_a_folder_without_a_manifest_gets_one_proposed(tmp_path):
     assert propose_manifest(tmp_path / "day1")["file"].tolist() == ["push-left.mp4", "push-right.mp4"]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(files=st.lists(st.text(min_size=1, max_size=12), min_size=1, max_size=6))
 def test_any_names_give_ids_that_are_unique_plain_file_names(tmp_path_factory, files):
     folder = tmp_path_factory.mktemp("raw")

@@ -23,7 +23,7 @@ def scene(seed: int, count: int, moving: float) -> tuple[np.ndarray, np.ndarray]
     return light, touched
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     seed=st.integers(0, 1000),
     moving=st.floats(0.1, 0.25),

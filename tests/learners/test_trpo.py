@@ -97,7 +97,7 @@ def test_conjugate_gradient_solves_each_row_and_leaves_a_zero_row_at_zero():
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(0, 0.99), st.floats(0, 1))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_advantages_match_their_definition(seed: int, discount: float, gae_lambda: float):
     rng = np.random.default_rng(seed)
     rewards, values = rng.standard_normal((2, 2, 3, HORIZON))
@@ -128,7 +128,7 @@ def test_baseline_predicts_a_quadratic_value_and_keeps_rows_apart():
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.001, 0.01, 0.1]))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_policy_step_improves_the_surrogate_within_the_divergence_bound(seed: int, bound: float):
     policy, theta = random_policy(rows=3)
     rng = np.random.default_rng(seed)

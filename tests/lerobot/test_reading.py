@@ -172,7 +172,7 @@ def test_what_is_no_data_set_is_told_in_a_line(tmp_path, copied):
         episode_views(copied, [TOP])
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(place=st.floats(0, 1), value=st.integers(0, 255), cut=st.booleans())
 def test_a_damaged_table_gives_possible_rows_or_a_line(copied, place, value, cut):
     path = write_episodes(copied, episodes())

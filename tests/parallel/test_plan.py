@@ -8,7 +8,7 @@ from anyview.parallel.needs import Needs
 from anyview.parallel.plan import simulate, ways
 from anyview.parallel.schedule import DONE, Schedule, State
 
-anywhere = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+anywhere = settings(max_examples=40, suppress_health_check=[HealthCheck.too_slow])
 
 
 @st.composite

@@ -16,7 +16,7 @@ from anyview.pusher.scene import ARENA_CENTRE, ARENA_RADIUS, GOAL_COLOURS, JOINT
 from anyview.tasks.push import CUP, OBJECT_RADIUS
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(st.integers(0, 2**32), st.sampled_from(["diverse", "narrow", "choice"]))
 def test_contexts_obey_their_definition(seed: int, kind: str) -> None:
     contexts, acceptance = sample_contexts(np.random.default_rng(seed), 20, kind)

@@ -34,7 +34,7 @@ def weights(step: int) -> dict[str, np.ndarray]:
     return {"w": np.arange(6.0).reshape(2, 3) + step, "t": np.array(step)}
 
 
-@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(arrays=ARRAYS, state=STATE, step=st.integers(0, 10**9))
 def test_what_is_loaded_is_what_was_saved(folder, arrays, state, step):
     checkpoints = Checkpoints(folder)

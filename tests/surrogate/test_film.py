@@ -32,7 +32,7 @@ def test_the_plan_makes_the_clips_of_the_study():
     assert set(clips["kind"][~extreme]) == {"standard", "distractor", "extreme_view"}
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(index=st.integers(0, 10_000))
 def test_the_object_moves_only_by_the_cup_and_ends_on_the_target(index):
     push = sample_push(stream(0, "test push", index))
@@ -100,7 +100,7 @@ def test_object_and_target_are_visible_and_meet(filmed):
         assert gaps[1] < 5
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(k1=st.floats(-0.17, 0.0), k2=st.floats(0.02, 0.05), fovy=st.floats(0.5, 0.8))
 def test_the_lens_bends_rays_as_brown_says_and_the_rendered_picture_covers_them(k1, k2, fovy):
     lens = Lens((64, 36), fovy, k1, k2)
@@ -127,7 +127,7 @@ def test_the_webcam_adds_noise_and_drift_but_keeps_the_picture():
 
 
 @given(seed=st.integers(0, 500))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_frame_times_increase_without_long_gaps_and_fill_a_clip(seed):
     times = frame_times(stream(seed, "test times"), 8.15)
     assert (np.diff(times) > 0).all()

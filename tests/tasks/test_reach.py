@@ -15,7 +15,7 @@ from anyview.pusher.task import load_task
 from anyview.runtime.errors import AnyviewError
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=5)
 @given(st.integers(0, 2**32), st.sampled_from(["diverse", "narrow"]))
 def test_contexts_obey_their_definition(seed: int, kind: str) -> None:
     contexts, acceptance = sample_contexts(np.random.default_rng(seed), 20, kind, "reach")

@@ -21,7 +21,7 @@ def goals(contexts: list[Context]) -> np.ndarray:
     return np.array([context.goal_xy for context in contexts])
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=5)
 @given(st.integers(0, 2**32), st.sampled_from(["diverse", "narrow"]))
 def test_contexts_obey_their_definition(seed: int, kind: str) -> None:
     contexts, _ = sample_contexts(np.random.default_rng(seed), 20, kind, "strike")

@@ -64,7 +64,7 @@ def test_at_first_the_context_is_copied_more_than_painted_over(model):
     assert (made - contexts).square().mean() < 0.3 * (noise - contexts).square().mean()
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(hnp.arrays(np.float32, (1, KEYPOINTS, 2), elements=st.floats(-1.25, 1.25, width=32)))
 def test_strokes_are_gaussians_around_places_and_lines(places):
     """Against the distance of each pixel's centre from a point, or from a dense row of points."""
@@ -77,7 +77,7 @@ def test_strokes_are_gaussians_around_places_and_lines(places):
         np.testing.assert_allclose(stroke, np.exp(-(gap**2) / 2), atol=0.01)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.tuples(st.integers(-3, 3), st.integers(-3, 3)), st.integers(0, 3))
 def test_the_first_frame_is_shifted_with_the_object_and_turned_with_tool_and_arm(step, quarters):
     """Against pixels moved one by one: whole steps, and quarter turns about a pixel's centre."""
@@ -113,7 +113,7 @@ def test_dec_draws_at_marks_where_they_are_known(model):
     assert torch.equal(placed[:, 4:], codes[:, 4:])
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(hnp.arrays(np.float32, (4, 3, 2), elements=st.floats(-1, 1, width=32)))
 def test_the_loss_of_places_is_their_mean_squared_distance(marks):
     places = np.linspace(-0.9, 0.9, 4 * 2 * KEYPOINTS, dtype=np.float32).reshape(4, KEYPOINTS, 2)
@@ -131,7 +131,7 @@ def test_a_mark_that_is_not_known_costs_nothing_and_pulls_at_nothing():
     assert torch.nonzero(codes.grad).tolist() == [[0, 0], [1, 3]]
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 1000), hnp.arrays(int, (9, 2), elements=st.integers(0, 15)))
 def test_marks_are_mirrored_with_their_pictures(seed, pixels):
     """A white pixel at each mark is still at it afterwards, whichever clips were mirrored."""

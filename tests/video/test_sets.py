@@ -28,7 +28,7 @@ def make_set(folder: Path, shards: int = 3) -> np.ndarray:
     return clips
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(
     count=st.integers(1, 9),
     height=st.integers(4, 35),

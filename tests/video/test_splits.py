@@ -25,14 +25,14 @@ def counts(table: pd.DataFrame) -> dict[str, int]:
     return table["split"].value_counts().to_dict()
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(seed=st.integers(0, 1000))
 def test_the_study_has_122_21_and_10_for_any_seed(seed):
     table = split_pairs(clips(71, 1, 5), seed, 122, 21)
     assert counts(table) == {"train": 122, "validation": 21, "extreme": 10}
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(seed=st.integers(0, 1000))
 def test_12_61_or_135_pairs_to_train_on_are_nested_and_the_same_clips_are_held_out(seed):
     kinds = ("standard", "distractor", "extreme_view")
@@ -43,7 +43,7 @@ def test_12_61_or_135_pairs_to_train_on_are_nested_and_the_same_clips_are_held_o
     assert [len(each["train"]) for each in (few, some, most)] == [12, 61, 135]
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(
     pairs=st.integers(3, 60),
     singles=st.integers(0, 5),
@@ -65,7 +65,7 @@ def test_no_pair_straddles_splits(pairs, singles, extreme, seed, shares):
         assert counts(table)["validation"] <= max(shares[1], 2)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(seed=st.integers(0, 200), before=st.integers(75, 100), added=st.integers(1, 10))
 def test_added_pairs_displace_no_more_pairs_than_they_are(seed, before, added):
     old = split_pairs(clips(before), seed, 122, 20).drop_duplicates("pair").set_index("pair")["split"]
