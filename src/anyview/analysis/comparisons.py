@@ -107,20 +107,17 @@ def factorial(methods: Methods, estimator: Estimator) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["contexts", "learner", "value", "low", "high"])
 
 
-def claimed(contrasts: pd.DataFrame) -> list[str]:
-    """The order that may be claimed of each contrast: ``nearer``, ``farther``, ``open`` or ``few``.
+def claimed(
+    contrasts: pd.DataFrame, counted: str = "runs", less: str = "nearer", more: str = "farther"
+) -> list[str]:
+    """The order that may be claimed of each contrast: ``less`` or ``more``, ``open`` or ``few``.
 
-    ``few``: fewer than ``ENOUGH_RUNS``. ``open``: the corrected test does not exclude chance.
+    ``few``: the column ``counted`` is below ``ENOUGH_RUNS``. ``open``: the corrected test does not exclude
+    chance.
     """
     return [
-        "few"
-        if row.runs < ENOUGH_RUNS
-        else "open"
-        if row.p >= SIGNIFICANT
-        else "farther"
-        if row.ratio > 1
-        else "nearer"
-        for row in contrasts.itertuples()
+        "few" if count < ENOUGH_RUNS else "open" if p >= SIGNIFICANT else more if ratio > 1 else less
+        for count, p, ratio in contrasts[[counted, "p", "ratio"]].itertuples(index=False)
     ]
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from anyview import paths
-from anyview.analysis.comparisons import ENOUGH_RUNS, SIGNIFICANT, log_distance
+from anyview.analysis.comparisons import ENOUGH_RUNS, claimed, log_distance
 from anyview.analysis.estimates import Estimator
 from anyview.analysis.replicates import CONTRAST, by_context, contrast, corrected, rate, stacked
 from anyview.analysis.statistics import sign_flip_test
@@ -108,18 +108,7 @@ def effects(runs: pd.DataFrame, levels: dict[str, list[str]], estimator: Estimat
             )
     table = pd.DataFrame(rows, columns=["evaluation", "factor", "before", "after", "pairs", *CONTRAST, "p"])
     table["p"] = corrected(table["p"], table["pairs"] >= ENOUGH_RUNS)
-    return table.assign(
-        claim=[
-            "few"
-            if row.pairs < ENOUGH_RUNS
-            else "open"
-            if row.p >= SIGNIFICANT
-            else "harms"
-            if row.ratio > 1
-            else "helps"
-            for row in table.itertuples()
-        ]
-    )
+    return table.assign(claim=claimed(table, "pairs", "helps", "harms"))
 
 
 def enough(effects: pd.DataFrame) -> pd.DataFrame:

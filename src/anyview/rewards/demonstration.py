@@ -12,14 +12,14 @@ import torch
 from torch import Tensor
 
 from anyview.config import Incomplete, RewardWeights
-from anyview.learners.common.interfaces import Arrays
+from anyview.rewards.fixed import FixedReward
 from anyview.translator.architectures import Translator
 from anyview.video.pixels import to_frames, to_input
 
 _BATCH = 64
 
 
-class DemonstrationReward:
+class DemonstrationReward(FixedReward):
     """-(t/T)^p (w_f L_f/u_f + w_i L_i/u_i)/(w_f + w_i): see ``interfaces.RewardSource``. Nothing is learned.
 
     u_f and u_i are a run's own means over t of (t/T)^p |..|^2 for a camera that keeps seeing o_0: the cost of
@@ -86,20 +86,6 @@ class DemonstrationReward:
     def targets(self) -> np.ndarray:
         """The demonstration each run imitates, from o_0 on in its own view: uint8 (R, T + 1, H, W, 3)."""
         return np.concatenate([self._first[:, None], to_frames(self._images)], axis=1)
-
-    def end_iteration(self) -> Arrays:
-        """Nothing to learn or log."""
-        return {}
-
-    def rescored(self) -> None:
-        """It never changes."""
-
-    def state(self) -> Arrays:
-        """Nothing beyond what it is made from."""
-        return {}
-
-    def restore(self, state: Arrays) -> None:
-        """Nothing to restore."""
 
 
 def frames_there(length: int, incomplete: Incomplete) -> np.ndarray:

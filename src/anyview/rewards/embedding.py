@@ -5,11 +5,11 @@ import torch
 from torch import Tensor
 
 from anyview.embedding.network import Embedding
-from anyview.learners.common.interfaces import Arrays
+from anyview.rewards.fixed import FixedReward
 from anyview.video.pixels import to_input
 
 
-class EmbeddingReward:
+class EmbeddingReward(FixedReward):
     """-(t/T)^p |e(o_t) - mean_i e(o_t^i)|^2 / u over demonstrations i; see ``interfaces.RewardSource``.
 
     By a constant of t it is the mean of -|e(o_t) - e(o_t^i)|^2. As in ``rewards.DemonstrationReward``, u is a
@@ -42,17 +42,3 @@ class EmbeddingReward:
         seen = self._embed(frames.reshape(runs * copies, *frames.shape[2:])).unflatten(0, (runs, copies))
         away = ((seen - self._targets[step - 1]) ** 2).sum(-1)
         return (-self._weights[step - 1] * away / self._costs[:, None]).cpu().numpy()
-
-    def end_iteration(self) -> Arrays:
-        """Nothing to learn or log."""
-        return {}
-
-    def rescored(self) -> None:
-        """It never changes."""
-
-    def state(self) -> Arrays:
-        """Nothing beyond what it is made from."""
-        return {}
-
-    def restore(self, state: Arrays) -> None:
-        """Nothing to restore."""

@@ -5,11 +5,11 @@ import torch
 from torch import Tensor
 
 from anyview.embedding.network import Embedding
-from anyview.learners.common.interfaces import Arrays
+from anyview.rewards.fixed import FixedReward
 from anyview.video.pixels import to_input
 
 
-class GoalReward:
+class GoalReward(FixedReward):
     """-|e(o_t) - g| / |e(o_0) - g|, g the mean of e over the last frames; see ``interfaces.RewardSource``.
 
     Standing still earns -1 a step. ``scales`` are the distances |e(o_0) - g| (R,): reward * scales is in the
@@ -39,17 +39,3 @@ class GoalReward:
         goals = self._goals.expand(len(frames), -1)[:, None]
         away = (self._embed(frames) - goals).norm(dim=-1)
         return (-away / self._costs[:, None]).cpu().numpy()
-
-    def end_iteration(self) -> Arrays:
-        """Nothing to learn or log."""
-        return {}
-
-    def rescored(self) -> None:
-        """It never changes."""
-
-    def state(self) -> Arrays:
-        """Nothing beyond what it is made from."""
-        return {}
-
-    def restore(self, state: Arrays) -> None:
-        """Nothing to restore."""
