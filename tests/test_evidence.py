@@ -38,6 +38,12 @@ def test_dvc_plans_every_translator_seed_and_reward(evidence):
     stages = evidence.run("dvc", "stage", "list", "--name-only").split()
     expected = {f"losses-train@{cell}" for cell in cells}
     expected |= {f"losses-imitate@{cell}-{reward}" for cell in cells for reward in params.rewards}
+    expected |= {
+        f"losses-imitate-others@{name}-{seed}-{reward}"
+        for name in params.translators
+        for seed in params.others.seeds
+        for reward in params.others.rewards
+    }
     assert {stage for stage in stages if stage.startswith("losses")} == expected
 
 

@@ -260,6 +260,18 @@ def test_the_study_knows_nothing_of_the_evidence_and_this_plans_every_seed():
     assert set().union(*(outs for _, outs in declared(EVIDENCE).values())) == outputs
 
 
+@pytest.mark.parametrize("folder", [ROOT, BEYOND, EVIDENCE], ids=["study", "beyond", "evidence"])
+def test_git_ignores_what_stages_make(folder):
+    """By the file at the root, whatever DVC has added to those beside the outputs."""
+    made = {out for _, outs in declared(folder).values() for out in outs if out.startswith("data/")}
+    paths = {f"{(folder / out).relative_to(ROOT)}{'' if Path(out).suffix else '/'}" for out in made}
+    rules = subprocess.run(
+        ["git", "check-ignore", "--verbose", *paths], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout.splitlines()
+    ignored = {rule.split("\t")[1] for rule in rules if rule.startswith(".gitignore:")}
+    assert ignored == paths
+
+
 def test_cells_are_those_of_params():
     params = load_params(ROOT / "params.yaml")
     cells: dict[str, set[str]] = {}

@@ -44,7 +44,7 @@ def kill_one(process: subprocess.Popen[str], rng: random.Random, latest: float) 
     if there := victims(process):
         with suppress(psutil.NoSuchProcess):
             rng.choice(there).send_signal(rng.choice([signal.SIGKILL, signal.SIGTERM]))
-    process.communicate(timeout=300)
+    process.communicate(timeout=900)  # of which a busy machine may need half: the other stages go on
 
 
 def lock_of(folder: Path) -> dict[str, object]:
