@@ -13,6 +13,7 @@ from anyview.scenes.studio import Light, studio
 from anyview.scenes.tabletop import sample_object, sample_room, sample_target, sample_things
 from anyview.surrogate.push import OBJECT_RADIUS, TARGET_HALF, Push, sample_push
 from anyview.trigonometry import unit_vector
+from anyview.video.marks import where_leaving
 
 VIEWS = ("left", "right")
 MARKS = ("object", "target", "tool", "wrist", "elbow")
@@ -70,17 +71,9 @@ def render_demonstration(rng: np.random.Generator, moments: int, size: int) -> D
         for places, view in zip(marks, views, strict=True):
             shown = view.lens.seen(view.camera.project(points))
             for joint in range(MARKS.index("wrist"), len(MARKS)):
-                shown[joint] = _leaving(shown[joint - 1], shown[joint])
+                shown[joint] = where_leaving(shown[joint - 1], shown[joint])
             places[index] = 0.5 * size * (shown + 1.0) - 0.5
     return Demonstration(clips, times, marks, push, views)
-
-
-def _leaving(inside: np.ndarray, outside: np.ndarray) -> np.ndarray:
-    """Where the way from ``inside`` to ``outside`` leaves the picture; either may be the other. Both (2,)."""
-    way = outside - inside
-    with np.errstate(divide="ignore", invalid="ignore"):
-        reach = np.where(way == 0, np.inf, (np.sign(way) - inside) / way)
-    return inside + way * min(1.0, max(float(reach.min()), 0.0))
 
 
 def _sample_views(rng: np.random.Generator) -> tuple[Push, tuple[View, View]]:

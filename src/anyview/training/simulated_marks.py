@@ -20,6 +20,7 @@ from anyview.pusher.task import load_task
 from anyview.runtime.errors import AnyviewError
 from anyview.trigonometry import unit_vector
 from anyview.video.datasets import Dataset
+from anyview.video.marks import where_leaving
 
 _AT_ONCE = 500  # clips
 
@@ -40,7 +41,7 @@ def simulated_marks(dataset: Dataset) -> np.ndarray:
         azimuths = np.array([context.azimuth for context in some])
         seen = project(_points(some), azimuths[:, None, None])
         for joint in (3, 4):
-            seen[..., joint, :] = _leaving(seen[..., joint - 1, :], seen[..., joint, :])
+            seen[..., joint, :] = where_leaving(seen[..., joint - 1, :], seen[..., joint, :])
         marks[first : first + _AT_ONCE] = seen
     return 0.5 * dataset.image_size * (marks + 1.0) - 0.5
 
@@ -57,14 +58,6 @@ def project(points: np.ndarray, azimuths: np.ndarray) -> np.ndarray:
     depth = CAMERA_DISTANCE + level * forward + drop * height
     right, up = (flat * across).sum(-1), level * height - drop * forward
     return np.stack([right, -up], -1) / (np.tan(np.deg2rad(CAMERA_FOVY) / 2) * depth)[..., None]
-
-
-def _leaving(inside: np.ndarray, outside: np.ndarray) -> np.ndarray:
-    """Where the ways from ``inside`` to ``outside`` leave the picture; either may be the other. (..., 2)."""
-    way = outside - inside
-    with np.errstate(divide="ignore", invalid="ignore"):
-        reach = np.where(way == 0, np.inf, (np.sign(way) - inside) / way).min(-1, keepdims=True)
-    return inside + way * reach.clip(0, 1)
 
 
 def _points(contexts: list[Context]) -> np.ndarray:

@@ -9,6 +9,17 @@ from anyview.runtime.errors import AnyviewError
 _FILE = "marks.npy"
 
 
+def where_leaving(inside: np.ndarray, outside: np.ndarray) -> np.ndarray:
+    """Where the ways from ``inside`` to ``outside`` leave the picture; either may be the other.
+
+    All are (..., 2), from -1 to 1 in the picture.
+    """
+    way = outside - inside
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = np.where(way == 0, np.inf, (np.sign(way) - inside) / way).min(-1, keepdims=True)
+    return inside + way * reach.clip(0, 1)
+
+
 def write_marks(folder: Path, marks: np.ndarray) -> None:
     """Write ``marks``, float32 (N, T, M, 2): x and y in pixels of M things, also if hidden or outside."""
     np.save(folder / _FILE, marks, allow_pickle=False)
