@@ -112,22 +112,34 @@ def test_killed_training_continues_to_the_same_bytes(pipeline, make_objective):
         assert (Path("killed") / name).read_bytes() == (Path("alone") / name).read_bytes(), name
 
 
-def test_pretraining_learns_from_the_other_set_first(make_objective, discs):
-    """Until then as if on that set alone; after it, from the cell's own, by the same random streams."""
+@pytest.mark.parametrize("rehearsed", [False, True])
+def test_pretraining_learns_from_the_other_set_first(make_objective, discs, rehearsed):
+    """Until then as if on that set alone; after it, from the cell's own, by the same random streams.
+
+    Or in turn from both, if the first is rehearsed.
+    """
     other = Dataset("rendered", disc_clips(40, seed=9), clip_table(["train"] * 30 + ["validation"] * 10))
     made = make_objective()
-    pretraining = Pretraining(dataset="rendered", iterations=3)
+    pretraining = Pretraining(dataset="rendered", iterations=3, rehearsed=rehearsed)
     cell = made.cell.model_copy(update={"pretraining": pretraining})
     both = TranslatorObjective(cell, made.training, 1, discs, other)
     alone = TranslatorObjective(made.cell, made.training, 1, other)
     model = made.network()
     for iteration in range(6):
-        expected = alone if iteration < 3 else made
+        expected = alone if iteration < 3 or (rehearsed and iteration == 4) else made
         pairs = both.batch(iteration)
         losses = both.losses(model, pairs, iteration, 0)
         assert torch.equal(losses, expected.losses(model, expected.batch(iteration), iteration, 0))
     (part, *_), (same, *_) = both.validation(), made.validation()
     assert torch.equal(both.validation_losses(model, part), made.validation_losses(model, same))
+
+
+def test_a_cell_may_have_a_learning_rate_and_schedule_of_its_own(make_objective):
+    made = make_objective()
+    assert (made.training.learning_rate, made.training.schedule) == (0.001, "constant")
+    cell = made.cell.model_copy(update={"learning_rate": 0.004, "schedule": "cosine"})
+    own = TranslatorObjective(cell, made.training, 1, made.dataset)
+    assert (own.training.learning_rate, own.training.schedule) == (0.004, "cosine")
 
 
 def test_pretraining_on_frames_of_another_size_is_refused(make_objective, discs):

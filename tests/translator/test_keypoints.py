@@ -19,8 +19,10 @@ from anyview.translator.keypoints import (
     KEYPOINTS,
     KeypointTranslator,
     RelativeKeypointTranslator,
+    Seen,
     _carry,
     _strokes,
+    finding_loss,
     place_loss,
     relative_places,
     with_places,
@@ -129,6 +131,25 @@ def test_a_mark_that_is_not_known_costs_nothing_and_pulls_at_nothing():
     loss.backward()
     assert loss.item() == pytest.approx((0.5**2 + 0.2**2) / 4)
     assert torch.nonzero(codes.grad).tolist() == [[0, 0], [1, 3]]
+
+
+@settings(max_examples=20)
+@given(hnp.arrays(np.float32, (2, 2, 2), elements=st.floats(-1.25, 1.25, width=32)))
+def test_finding_costs_cross_entropy_with_gaussians_beside_the_places(marks):
+    """Pixel by pixel, in maps of 6 by 6; of a mark that is not known there is no loss."""
+    marks[1, 1] = np.nan
+    rng = np.random.default_rng(4)
+    logits = rng.normal(size=(2, KEYPOINTS, 36)).astype(np.float32)
+    codes = torch.from_numpy(rng.uniform(-1, 1, (2, 2 * KEYPOINTS + 32)).astype(np.float32))
+    seen = Seen(codes, torch.zeros(2, 16, 6, 6), torch.from_numpy(logits))
+    entropies = []
+    for n, m in ((0, 0), (0, 1), (1, 0)):
+        x, y = (marks[n, m].clip(-5 / 6, 5 / 6) + 1) * 3 - 0.5  # pixels of the map, at its edge if outside
+        wanted = np.array([np.exp(-((c - x) ** 2 + (r - y) ** 2) / 2) for r in range(6) for c in range(6)])
+        told = np.exp(logits[n, m]) / np.exp(logits[n, m]).sum()
+        entropies.append(-(wanted / wanted.sum() * np.log(told)).sum())
+    expected = float(place_loss(codes, torch.from_numpy(marks))) + 0.02 * np.sum(entropies) / 4
+    assert float(finding_loss(seen, torch.from_numpy(marks))) == pytest.approx(expected, rel=1e-4)
 
 
 @settings(max_examples=20)

@@ -33,6 +33,9 @@ class Pretraining(Block):
         "cell's own set where there is no pretraining"
     )
     iterations: CountOrNone = Field(description="how many of the cell's iterations that takes; 0 for none")
+    rehearsed: bool = Field(
+        default=False, description="every other iteration after those is of that set again, as for keypoints"
+    )
 
 
 class TranslatorCell(WithExperts):
@@ -57,6 +60,9 @@ class TranslatorCell(WithExperts):
     task_embedding: bool = Field(
         default=False,
         description="give T the mean of Enc1 over 8 frames of the expert's clip; not in the thesis",
+    )
+    learning_rate: Positive | None = Field(
+        default=None, description="the cell's own instead of `training.learning_rate`"
     )
     schedule: Literal["constant", "cosine"] | None = Field(
         default=None, description="the cell's own instead of `training.schedule`"

@@ -59,7 +59,8 @@ class TranslatorObjective:
         if self._pretraining.image_size != dataset.image_size:
             sizes = f"{self._pretraining.image_size} and {dataset.image_size} pixels"
             raise AnyviewError(f"data sets {self._pretraining.name} and {dataset.name}: frames of {sizes}")
-        self.training = training.model_copy(update={"schedule": cell.schedule or training.schedule})
+        own = {"learning_rate": cell.learning_rate, "schedule": cell.schedule}
+        self.training = training.model_copy(update={key: value for key, value in own.items() if value})
         self.optimizer = _OPTIMIZERS[cell.optimizer]
         self._augmentations = (
             {learnt.name: Augmentation(learnt) for learnt in self._learnt()} if cell.augment else {}
@@ -134,7 +135,9 @@ class TranslatorObjective:
         return [self._pretraining, self.dataset] if self.cell.pretraining.iterations else [self.dataset]
 
     def _learnt_at(self, iteration: int) -> Dataset:
-        return self._pretraining if iteration < self.cell.pretraining.iterations else self.dataset
+        first = self.cell.pretraining
+        rehearsed = first.rehearsed and (iteration - first.iterations) % 2 == 1
+        return self._pretraining if iteration < first.iterations or rehearsed else self.dataset
 
     def _frames(
         self, model: Translator, dataset: Dataset, pairs: FramePairs

@@ -35,6 +35,7 @@ _SHIFTING = [0]  # keypoints that carry the first frame along: the object, see v
 _TURNING = [2, 3]  # those from which lines do: from the tool to the wrist, and on to the elbow
 _SHORT = 0.05  # a line shorter than that has no direction
 _SIGMA = 1.0  # of a Gaussian, in pixels of the finest map
+_SHARPNESS = 0.02  # weight of the cross-entropy of maps
 
 
 class Seen(NamedTuple):
@@ -45,6 +46,8 @@ class Seen(NamedTuple):
     strokes, which are the keypoints and the lines from each to the next."""
     map: Tensor
     """(N, 16, H/2, W/2)."""
+    logits: Tensor
+    """Of each keypoint to be at a pixel of that map, row by row, (N, K, H/2 * W/2)."""
 
 
 class KeypointEncoder(nn.Module):
@@ -72,14 +75,14 @@ class KeypointEncoder(nn.Module):
         x = x + self.everywhere(pooled)[:, :, None, None]
         for skip, lateral, up, smooth in zip((middle, fine), self.lateral, self.up, self.smooth, strict=True):
             x = smooth(activate(F.interpolate(up(x), scale_factor=2.0) + lateral(skip)))
-        heat = self.heat(x).flatten(2).float().softmax(-1)  # places need more digits than bfloat16 has
-        where = heat.unflatten(2, x.shape[2:])
+        logits = self.heat(x).flatten(2).float()  # places need more digits than bfloat16 has
+        where = logits.softmax(-1).unflatten(2, x.shape[2:])
         axis = _axis(x)
         places = torch.stack(((where.sum(2) * axis).sum(-1), (where.sum(3) * axis).sum(-1)), -1)
         strokes = _strokes(places.detach(), x).flatten(2)
         seen = torch.cat((F.avg_pool2d(frames, 2), self.look(x)), 1)
         looks = F.normalize(strokes, p=1, dim=-1, eps=1.0) @ seen.flatten(2).transpose(1, 2).float()
-        return Seen(torch.cat((places.flatten(1), self.vector(pooled), looks.flatten(1)), 1), x)
+        return Seen(torch.cat((places.flatten(1), self.vector(pooled), looks.flatten(1)), 1), x, logits)
 
     def _shrink(self, x: Tensor) -> list[Tensor]:
         maps = []
@@ -96,7 +99,8 @@ class KeypointTranslation(nn.Module):
     to the target" is one set of weights for all contexts and points of view.
 
     If ``relative``, T is also told where the keypoints are on the way from the first to the second in the
-    first frames: "half of the way" is a quotient of distances, which layers learn slowly.
+    first frames: "half of the way" is a quotient of distances, which layers learn slowly. And looks start
+    from the context's own: that is for experts of another body.
     """
 
     def __init__(self, width: int, relative: bool = False):
@@ -119,7 +123,7 @@ class KeypointTranslation(nn.Module):
         for layer in self.hidden:
             x = activate(layer(x))
         mixed = self.weights(x).unflatten(1, (KEYPOINTS, KEYPOINTS)) @ _places(z2)
-        places, rest = z2[:, : 2 * KEYPOINTS], z1[:, 2 * KEYPOINTS :]
+        places, rest = z2[:, : 2 * KEYPOINTS], (z2 if self.relative else z1)[:, 2 * KEYPOINTS :]
         return self.steps(x) + torch.cat((places + mixed.flatten(1), rest), 1)
 
 
@@ -218,8 +222,11 @@ class KeypointTranslator(nn.Module):
 
     def encode_context(self, frames: Tensor, noise: Generator | None = None) -> tuple[Tensor, list[Tensor]]:
         """z2 (N, width) of first frames (N, 3, H, W), and what the decoder needs beside codes."""
-        code, finest = self.encoder(frames)
-        return code, [frames, code, finest]
+        return self.context_of(frames, self.encoder(frames))
+
+    def context_of(self, frames: Tensor, seen: Seen) -> tuple[Tensor, list[Tensor]]:
+        """What ``encode_context`` returns, of first frames (N, 3, H, W) and of what is ``seen`` in them."""
+        return seen.code, [frames, seen.code, seen.map]
 
     def task_frames(self, length: int) -> np.ndarray:
         """Steps of a clip of ``length`` frames whose code T is given beside the present one: the first."""
@@ -273,6 +280,23 @@ def place_loss(codes: Tensor, marks: Tensor) -> Tensor:
     """
     gaps = _places(codes)[:, : marks.shape[1]].float() - marks.clamp(-_OUTSIDE, _OUTSIDE)
     return torch.where(marks.isnan(), 0.0, gaps).square().sum(-1).mean()
+
+
+def finding_loss(seen: Seen, marks: Tensor) -> Tensor:
+    """``place_loss`` of what is ``seen``, plus ``_SHARPNESS`` times a cross-entropy of the keypoints' maps.
+
+    What these should be are Gaussians around ``marks`` (N, M, 2), those outside of the picture counted as at
+    its edge. The mean place alone says little to a map that is wide: half of the updates do (as regularised
+    maps do for Nibali et al. 2018).
+    """
+    maps = seen.logits[:, : marks.shape[1]].log_softmax(-1)
+    axis = _axis(seen.map)
+    edge, side = float(axis[-1]), len(axis)
+    gaps = axis - marks.nan_to_num(0.0).clamp(-edge, edge)[..., None]  # (N, M, 2, side)
+    columns, rows = torch.exp(-0.5 * (0.5 * side / _SIGMA * gaps) ** 2).unbind(2)
+    wanted = F.normalize((rows[..., None] * columns[..., None, :]).flatten(2), p=1, dim=-1)
+    known = ~marks.isnan().any(-1)
+    return place_loss(seen.code, marks) - _SHARPNESS * ((wanted * maps).sum(-1) * known).mean()
 
 
 def with_places(codes: Tensor, marks: Tensor) -> Tensor:

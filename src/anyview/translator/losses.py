@@ -13,7 +13,7 @@ from torch.nn import functional as F
 
 from anyview.config import LossWeights
 from anyview.translator.architectures import Translator
-from anyview.translator.keypoints import KeypointTranslator, place_loss, with_places
+from anyview.translator.keypoints import KeypointTranslator, finding_loss, place_loss, with_places
 
 FRAME_SCALE = 100 / 2
 ALIGNMENT_SCALE = 1000
@@ -102,8 +102,15 @@ def batch_losses(
     decodings.
     """
     target = paired[len(context) :]
-    z1, z_true = model.encode_expert(paired, noise).chunk(2)
-    z2, skips = model.encode_context(context, noise)
+    found: Tensor | float = 0.0
+    if marks is not None and isinstance(model, KeypointTranslator):
+        seen, first = model.encoder(paired), model.encoder(context)
+        found = (2 * finding_loss(seen, marks.paired) + finding_loss(first, marks.context)) / 3
+        z, (z2, skips) = seen.code, model.context_of(context, first)
+    else:
+        z = model.encode_expert(paired, noise)
+        z2, skips = model.encode_context(context, noise)
+    z1, z_true = z.chunk(2)
     task = None
     if clip is not None:
         # Without gradients a batch takes a quarter longer than with no embedding, and not twice as long. Enc1
@@ -115,7 +122,6 @@ def batch_losses(
 
     places, drawn = None, z3
     if marks is not None and isinstance(model, KeypointTranslator):
-        found = place_loss(torch.cat((z1, z_true, z2)), torch.cat(marks))
         wanted_places = marks.paired[len(context) :]
         places = PLACE_SCALE * (found + place_loss(z3, wanted_places))
         # Dec learns to draw from the places that are right. Those found at first teach it to blur.
