@@ -204,7 +204,7 @@ class BeyondMethodCell(WithExperts, MethodCell):
     contexts: Literal["evaluation", "tuning"] = Field(
         default="evaluation", description="the random stream that the contexts are drawn from"
     )
-
+    runs: Count | None = Field(default=None, description="how many contexts, instead of `imitation.runs`")
     angles: list[Annotated[int, Field(ge=0, le=180)]] = Field(
         default=[],
         description="degrees between the camera of a clip and the agent's: every context is run once for "

@@ -101,9 +101,10 @@ class Params(Block):
         )
 
     def imitating(self, name: str) -> "Params":
-        """These params with the cell ``name`` of `beyond` as one of `imitation`, which has its clips."""
+        """These params with the cell ``name`` of `beyond` as one of `imitation`, with its clips and runs."""
         cell = self.beyond.cells[name]
         changed = {"dataset": cell.dataset, "demonstrations": cell.demonstrations, "cells": {name: cell}}
+        changed |= {"runs": cell.runs or self.imitation.runs}
         return self.model_copy(update={"imitation": self.imitation.model_copy(update=changed)})
 
     @property
