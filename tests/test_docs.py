@@ -1,5 +1,7 @@
 """What the documents say can be followed: links, paths, commands, keys of params, names in the code."""
 
+import csv
+import json
 import re
 import shlex
 import subprocess
@@ -171,3 +173,23 @@ def understood_by_anyview(arguments: list[str]) -> None:
     assert command is not None, arguments
     if arguments[1:]:
         command.make_context(arguments[0], arguments[1:])
+
+
+def test_the_front_page_has_the_numbers_of_the_landed_metrics():
+    """Of every method: successes and median distance with their intervals, and how it compares with ours."""
+    methods = json.loads((ROOT / "metrics/imitation.json").read_text(encoding="utf-8"))
+    with (ROOT / "metrics/plots/differences.csv").open(encoding="utf-8") as file:
+        contrasts = list(csv.DictReader(file))
+    expected = []
+    for (cell, numbers), contrast in zip(methods.items(), [None, *contrasts], strict=True):
+        rate = [100 * numbers[f"success_rate{bound}"] for bound in ("", "_low", "_high")]
+        metres = [100 * numbers[f"final_distance_median{bound}"] for bound in ("", "_low", "_high")]
+        count, compared = round(numbers["success_rate"] * numbers["runs"]), "–"
+        if contrast:
+            ratio, p = float(contrast["ratio"]), float(contrast["p"])
+            told = "p < 0.001" if p < 0.001 else f"p {p:.3g}" if p < 0.05 else f"open, p {p:.3g}"
+            compared = f"{ratio:.2g} ({told})"
+        success = "{}/{}, {:.0f}% [{:.0f}, {:.0f}]".format(count, numbers["runs"], *rate)
+        expected.append((cell, success, "{:.1f} [{:.1f}, {:.1f}]".format(*metres), compared))
+    page = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert re.findall(r"^\| \**`([\w-]+)`.* \| (\d+/.*?) \| (.*?) \| (.*?) \|$", page, re.M) == expected
