@@ -46,7 +46,7 @@ def study(tmp_path_factory, root: Path) -> Path:
         "batch_size": 8,
     }
     params["beyond"]["cells"]["choice-one-clip"]["demonstrations"] = 2
-    params["beyond"]["cells"]["choice-angles"]["angles"] = [30, 180]
+    params["beyond"]["cells"]["choice-angles"] |= {"angles": [30, 180], "runs": 3}
     with (folder / "params.yaml").open("w") as handle:
         yaml.dump(params, handle)
     contexts = sample_contexts(stream(0, "test"), CLIPS, "choice")[0]
@@ -104,14 +104,15 @@ def test_every_context_is_run_for_each_goal_by_clips_of_its_own(study, root):
 
 
 def test_every_context_is_run_for_each_angle_by_the_nearest_clip_of_each_goal(study, root):
+    """And there are as many contexts as the cell says, not ``imitation.runs``."""
     command = [sys.executable, root / "stages/imitate.py", "choice-angles"]
     done = subprocess.run(command, cwd=study, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     folder = study / "data/policies/choice-angles"
     runs = pd.read_csv(folder / "runs.csv")
-    assert list(runs["context"]) == [0, 1] * 4
-    assert list(runs["choice"]) == ["red", "red", "green", "green"] * 2
-    assert list(runs["angle"]) == [30] * 4 + [180] * 4
+    assert list(runs["context"]) == [0, 1, 2] * 4
+    assert list(runs["choice"]) == (["red"] * 3 + ["green"] * 3) * 2
+    assert list(runs["angle"]) == [30] * 6 + [180] * 6
     manifest = pd.read_csv(study / "data/clips/choice/manifest.csv")[2:].set_index("clip")
     azimuths = manifest["context"].map(lambda text: Context.from_json(text).azimuth)
     shown = pd.read_csv(folder / "demonstrations.csv").set_index(["angle", "choice", "context"])["clip"]
