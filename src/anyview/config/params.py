@@ -103,8 +103,12 @@ class Params(Block):
     def imitating(self, name: str) -> "Params":
         """These params with the cell ``name`` of `beyond` as one of `imitation`, with its clips and runs."""
         cell = self.beyond.cells[name]
-        changed = {"dataset": cell.dataset, "demonstrations": cell.demonstrations, "cells": {name: cell}}
-        changed |= {"runs": cell.runs or self.imitation.runs}
+        changed = {
+            "dataset": cell.dataset,
+            "demonstrations": cell.demonstrations,
+            "runs": cell.runs or self.imitation.runs,
+            "cells": {name: cell},
+        }
         return self.model_copy(update={"imitation": self.imitation.model_copy(update=changed)})
 
     @property
