@@ -11,6 +11,7 @@ from anyview.runtime.errors import choose, run_stage
 from anyview.training.common.fit import fit
 from anyview.training.simulated_marks import simulated_marks
 from anyview.training.translator import TranslatorObjective, open_learnt
+from anyview.video.datasets import Dataset
 
 
 def main(arguments: list[str]) -> None:
@@ -19,15 +20,18 @@ def main(arguments: list[str]) -> None:
     name = choose(arguments, params.beyond.translators, "python train.py CELL")
     cell = params.beyond.translators[name]
     dataset, pretraining = open_learnt(cell)
-    if cell.other_experts and cell.weights.places:
-        marks = simulated_marks(dataset)
-        dataset = replace(dataset, marks=marks)
-        pretraining = pretraining and replace(pretraining, marks=marks)
+    if cell.weights.places:
+        dataset, pretraining = _marked(dataset), pretraining and _marked(pretraining)
     fit(
         name,
         TranslatorObjective(cell, params.training, params.base.seed, dataset, pretraining),
         paths.model(name),
     )
+
+
+def _marked(dataset: Dataset) -> Dataset:
+    """With the marks of its own clips; those of other experts' clips it has where their set does."""
+    return replace(dataset, marks=simulated_marks(dataset))
 
 
 if __name__ == "__main__":

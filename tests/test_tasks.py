@@ -57,7 +57,7 @@ def small_study(root: Path, folder: Path, *tasks: str) -> None:
             "pretraining": {"dataset": task, "iterations": 0}
         }
         cell = beyond["cells"]["reach"] | {"dataset": task, "experts": task, "model": f"sim-{task}"}
-        cell |= {"demonstrations": 2}
+        cell |= {"demonstrations": 2, "runs": None}
         beyond["cells"][task] = cell
     with (folder / "params.yaml").open("w") as handle:
         yaml.dump(params, handle)

@@ -8,7 +8,7 @@ import pytest
 from anyview.pusher.contexts import sample_contexts
 from anyview.pusher.expert import roll_out
 from anyview.pusher.render import renderer
-from anyview.pusher.scene import ARENA_CENTRE, CAMERA_DISTANCE, CAMERA_ELEVATION
+from anyview.pusher.scene import ARENA_CENTRE, CAMERA_DISTANCE, CAMERA_ELEVATION, FINGER_HEIGHT
 from anyview.pusher.task import load_task
 from anyview.runtime.errors import AnyviewError
 from anyview.seeds import stream
@@ -26,8 +26,7 @@ def simulated():
     positions, _ = roll_out(contexts)
     camera = renderer("push", SIZE)
     frames = np.stack([camera.render_clip(*each) for each in zip(contexts, positions, strict=True)])
-    table = pd.DataFrame({"context": [context.to_json() for context in contexts]})
-    return contexts, positions, Dataset("diverse", frames, table)
+    return contexts, positions, _described(contexts, frames)
 
 
 @pytest.fixture(scope="module")
@@ -70,6 +69,45 @@ def test_marks_are_where_object_target_and_tool_are_seen(simulated, marks):
     assert np.nanmedian(np.hypot(*(targets - marks[:, 0, 1]).T)) < 0.5
     assert np.abs(marks[:, -1, 0] - marks[:, -1, 1]).max() < 1.5  # the object, taller, ends on the target
     assert np.array_equal(marks[:, 0, 1], marks[:, -1, 1])
+
+
+def test_two_goals_are_marked_in_the_order_of_their_colours():
+    """Whichever the expert chose: no mark of a first frame tells which that is."""
+    contexts, _ = sample_contexts(stream(3, "test"), 4, "choice")
+    contexts = [context.choosing(colour) for context in contexts for colour in ("red", "green")]
+    positions, _ = roll_out(contexts)
+    camera = renderer("push", SIZE)
+    frames = np.stack([camera.render_clip(*each) for each in zip(contexts, positions, strict=True)])
+    found = simulated_marks(_described(contexts, frames))
+    assert found.shape == (8, 50, 6, 2)
+    assert np.array_equal(found[::2, 0], found[1::2, 0])
+    for first, marks in zip(frames[:, 0], found[:, 0], strict=True):
+        for place, channel in ((1, 0), (5, 1)):
+            column, row = marks[place].round().astype(int)
+            assert first[row, column].argmax() == channel
+    ends = np.abs(found[:, -1, :1] - found[:, -1, [1, 5]]).max(-1)
+    assert (ends.argmin(1) == [0, 1] * 4).all()
+    assert ends.min(1).max() < 1.5
+
+
+@pytest.mark.parametrize(("task", "moving"), [("reach", 0), ("strike", 1), ("sweep", 5)])
+def test_other_tasks_have_the_middle_of_their_objects_or_the_tool_marked(task: str, moving: int):
+    contexts, _ = sample_contexts(stream(3, "test"), 4, "diverse", task)
+    positions, _ = roll_out(contexts)
+    frames = np.empty((4, 50, SIZE, SIZE, 3), np.uint8)
+    found = simulated_marks(_described(contexts, frames))
+    assert found.shape == (4, 50, 5, 2)
+    if not moving:
+        assert np.array_equal(found[:, :, 0], found[:, :, 2])
+        return
+    middle = positions[..., 3:].reshape(4, 50, moving, 2).mean(2)
+    raised = np.concatenate([middle, np.full((4, 50, 1), FINGER_HEIGHT)], -1)
+    azimuths = np.array([context.azimuth for context in contexts])[:, None]
+    np.testing.assert_allclose(found[:, :, 0], SIZE / 2 * (project(raised, azimuths) + 1) - 0.5, atol=1e-4)
+
+
+def _described(contexts: list, frames: np.ndarray) -> Dataset:
+    return Dataset("set", frames, pd.DataFrame({"context": [context.to_json() for context in contexts]}))
 
 
 def _without_distractors(frame: np.ndarray) -> np.ndarray:

@@ -15,12 +15,14 @@ from anyview.seeds import stream
 from anyview.training.augmentation import mirror
 from anyview.training.common.fit import fit
 from anyview.training.translator import TranslatorObjective
+from anyview.translator.architectures import make_translator
 from anyview.translator.keypoints import (
     KEYPOINTS,
     KeypointTranslator,
     RelativeKeypointTranslator,
     Seen,
     _carry,
+    _ends,
     _strokes,
     finding_loss,
     place_loss,
@@ -28,7 +30,7 @@ from anyview.translator.keypoints import (
     with_places,
 )
 from anyview.translator.losses import Marks
-from anyview.translator.weights import load_translator
+from anyview.translator.weights import load_translator, save_translator
 from anyview.video.marks import write_marks
 from anyview.video.pixels import to_input
 from tests.training.discworld import SIZE, disc_marks
@@ -227,6 +229,42 @@ def test_relative_places_are_the_same_however_the_picture_is_turned(turn, scale,
     plain = relative_places(*(torch.from_numpy(np.append(each, np.zeros(32))[None]) for each in (now, first)))
     torch.testing.assert_close(found, plain)
     torch.testing.assert_close(found[0, :2], torch.tensor([part, 0.0], dtype=torch.float64))
+
+
+@given(part=st.floats(0, 1), goal=st.integers(1, KEYPOINTS - 1))
+def test_told_the_end_t_measures_the_way_to_the_keypoint_where_the_first_one_ends(part: float, goal: int):
+    """Whichever that is: of goals that look alike, the expert's last frame tells which one counts."""
+    places = np.stack(np.meshgrid([-0.8, -0.3, 0.3, 0.8], [-0.4, 0.4]), -1).reshape(-1, 2)
+    now, last = places.copy(), places.copy()
+    now[0] += part * (places[goal] - places[0])
+    last[0] = places[goal]
+    first, shown, ended = (
+        torch.from_numpy(np.append(each, np.zeros(32))[None]) for each in (places, now, last)
+    )
+    ends = _ends(first, ended, torch.zeros(KEYPOINTS))
+    assert ends[0, 0, goal] > 0.98
+    along, beside = relative_places(shown, first, ends)[0, :2].tolist()
+    assert along == pytest.approx(part, abs=0.03)
+    assert beside == pytest.approx(0, abs=0.03)
+
+
+@pytest.mark.parametrize("architecture", ["keypoint", "keypoint-relative"])
+@pytest.mark.parametrize("task_embedding", [False, True])
+def test_the_last_frame_tells_t_something_only_with_a_task_embedding(
+    tmp_path, architecture: str, task_embedding: bool
+):
+    torch.manual_seed(1)
+    save_translator(tmp_path, make_translator(architecture, 16, task_embedding), {})
+    model = load_translator(tmp_path)
+    clip, context = frames(5), frames(1)
+    other = torch.cat((clip[:4], -clip[4:]))
+    with torch.no_grad():
+        z2, _ = model.encode_context(context)
+        made = [
+            model.translate(z1, z2, model.embed_task(z1))[:4]
+            for z1 in map(model.encode_expert, (clip, other))
+        ]
+    assert torch.equal(*made) != task_embedding
 
 
 def test_relative_places_are_finite_where_object_and_target_are_one():

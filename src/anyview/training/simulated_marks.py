@@ -26,16 +26,19 @@ _AT_ONCE = 500  # clips
 
 
 def simulated_marks(dataset: Dataset) -> np.ndarray:
-    """Of each frame of a simulated set the marks that rendered scenes have, float32 (N, 50, 5, 2) in pixels.
+    """Of each frame of a simulated set the marks that rendered scenes have, float32 (N, 50, M, 2) in pixels.
 
     These are object, target, tool, and for wrist and elbow the arm's last two joints: instead of one outside
-    of the picture the place where the arm leaves it. Raises AnyviewError if the manifest tells no contexts.
+    of the picture the place where the arm leaves it. Of several objects it is their middle, of none the tool.
+    Where there are two goals, the target is the first and the second is the sixth mark. Raises AnyviewError
+    if the manifest tells no contexts.
     """
     if "context" not in dataset.clips:
         manifest = paths.clip_set(dataset.name) / "manifest.csv"
         raise AnyviewError(f"{manifest}: no column context; run the simulate stage again")
     contexts = [Context.from_json(text) for text in dataset.clips["context"]]
-    marks = np.empty((*dataset.frames.shape[:2], 5, 2), np.float32)
+    count = 4 + len(contexts[0].goals)
+    marks = np.empty((*dataset.frames.shape[:2], count, 2), np.float32)
     for first in range(0, len(contexts), _AT_ONCE):
         some = contexts[first : first + _AT_ONCE]
         azimuths = np.array([context.azimuth for context in some])
@@ -61,13 +64,15 @@ def project(points: np.ndarray, azimuths: np.ndarray) -> np.ndarray:
 
 
 def _points(contexts: list[Context]) -> np.ndarray:
-    """The marked points (N, 50, 5, 3) along the expert's way, in metres."""
+    """The marked points (N, 50, M, 3) along the expert's way, in metres."""
     positions, _ = roll_out(contexts)
     links = LINK * unit_vector(np.cumsum(positions[..., :3], axis=-1))
     elbow, wrist, tool = np.moveaxis(np.cumsum(links, axis=-2), -2, 0)
-    goals = np.array([context.goal_xy for context in contexts])
-    target = np.broadcast_to(goals[:, None], tool.shape)
-    flat = np.stack([positions[..., 3:5], target, tool, wrist, elbow], axis=-2)
+    objects = positions[..., 3:].reshape(*tool.shape[:2], -1, 2)
+    middle = objects.mean(axis=2) if objects.shape[2] else tool
+    goals = np.array([context.goals for context in contexts])[:, None]
+    target, *others = np.moveaxis(np.broadcast_to(goals, (*tool.shape[:2], *goals.shape[2:])), 2, 0)
+    flat = np.stack([middle, target, tool, wrist, elbow, *others], axis=-2)
     above = load_task(contexts[0].task).model("twist").body("link0").pos[2]
-    heights = (FINGER_HEIGHT, 0.0, FINGER_HEIGHT, above, above)
-    return np.concatenate([flat, np.broadcast_to(np.array(heights)[:, None], (*flat.shape[:-1], 1))], axis=-1)
+    heights = np.array([FINGER_HEIGHT, 0.0, FINGER_HEIGHT, above, above, *[0.0] * len(others)])
+    return np.concatenate([flat, np.broadcast_to(heights[:, None], (*flat.shape[:-1], 1))], axis=-1)

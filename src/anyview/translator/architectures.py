@@ -12,12 +12,12 @@ _OF_KEYPOINTS = {kind.architecture: kind for kind in (KeypointTranslator, Relati
 
 
 def make_translator(architecture: str, image_size: int, task_embedding: bool = False) -> Translator:
-    """A new translator. Those of keypoints have their own task embedding, whatever ``task_embedding`` says.
+    """A new translator, whose T is told of the whole clip if ``task_embedding``.
 
     Raises AnyviewError for an unknown architecture, or a size that its strides do not divide.
     """
     if architecture in _OF_KEYPOINTS:
-        return _OF_KEYPOINTS[architecture](image_size)
+        return _OF_KEYPOINTS[architecture](image_size, task_embedding)
     if architecture not in ARCHITECTURES:
         known = ", ".join([*ARCHITECTURES, *_OF_KEYPOINTS])
         raise AnyviewError(f"architecture {architecture!r}: must be one of {known}")

@@ -28,6 +28,7 @@ _LOOK = 8  # entries that describe what is seen at a stroke, of which the first 
 _CHANNELS = 16, 32, 64  # of the maps at a half, a quarter and an eighth of the frame's side
 _HIDDEN = 256
 _STRIDE = 8
+_NEAR = 0.15  # of where something ends
 _OUTSIDE = 1.1  # where what is outside of the picture counts as being
 _LEAST_WAY = 0.1  # between two keypoints, so that the same place twice is no division by nothing
 _COPIED = 5.0  # added to the mask of what stands still, so that at first most is copied
@@ -101,30 +102,41 @@ class KeypointTranslation(nn.Module):
     If ``relative``, T is also told where the keypoints are on the way from the first to the second in the
     first frames: "half of the way" is a quotient of distances, which layers learn slowly. And looks start
     from the context's own: that is for experts of another body.
+
+    If it is told the ``end``, the expert's last frame, that way leads not to the second keypoint but to the
+    one where the first ends: a mean of those that are near (an attention, Vaswani et al. 2017). And keypoints
+    may go there as well.
     """
 
-    def __init__(self, width: int, relative: bool = False):
+    def __init__(self, width: int, relative: bool = False, end: bool = False):
         super().__init__()
         self.relative = relative
         inputs = 3 * (width + 2 * KEYPOINTS * relative)
         self.hidden = nn.ModuleList([nn.Linear(inputs, _HIDDEN), nn.Linear(_HIDDEN, _HIDDEN)])
-        self.weights = nn.Linear(_HIDDEN, KEYPOINTS**2)
+        self.weights = nn.Linear(_HIDDEN, KEYPOINTS * (KEYPOINTS + end))
         self.steps = nn.Linear(_HIDDEN, width)
         with torch.no_grad():  # at first all stay where they are
             for layer in (self.weights, self.steps):
                 layer.weight.mul_(0.1)
                 layer.bias.zero_()
+        self.ends = nn.Parameter(torch.zeros(KEYPOINTS)) if end else None
 
-    def forward(self, z1: Tensor, z2: Tensor, first: Tensor) -> Tensor:
-        x = torch.cat((z1, z2, first), dim=1)
+    def forward(self, z1: Tensor, z2: Tensor, first: Tensor, last: Tensor | None = None) -> Tensor:
+        """z3 (N, width) of ``z1``, ``z2`` and the expert's ``first`` and ``last`` code, each (N, width)."""
+        places = _places(z2)
+        x, known, ends = torch.cat((z1, z2, first), dim=1), places, None
+        if self.ends is not None:
+            assert last is not None
+            ends = _ends(first, last, self.ends)
+            known = torch.cat((places, ends @ places), 1)
         if self.relative:
-            on_way = [relative_places(*pair) for pair in ((z1, first), (first, first), (z2, z2))]
+            on_way = [relative_places(*pair, ends) for pair in ((z1, first), (first, first), (z2, z2))]
             x = torch.cat((x, *on_way), dim=1)
         for layer in self.hidden:
             x = activate(layer(x))
-        mixed = self.weights(x).unflatten(1, (KEYPOINTS, KEYPOINTS)) @ _places(z2)
-        places, rest = z2[:, : 2 * KEYPOINTS], (z2 if self.relative else z1)[:, 2 * KEYPOINTS :]
-        return self.steps(x) + torch.cat((places + mixed.flatten(1), rest), 1)
+        moved = places + self.weights(x).unflatten(1, (KEYPOINTS, -1)) @ known
+        rest = (z2 if self.relative else z1)[:, 2 * KEYPOINTS :]
+        return self.steps(x) + torch.cat((moved.flatten(1), rest), 1)
 
 
 class DrawingTerms(NamedTuple):
@@ -201,19 +213,20 @@ class KeypointTranslator(nn.Module):
     """
 
     architecture = "keypoint"
+    relative = False
     width = 2 * KEYPOINTS + _VECTOR + _STROKES * _LOOK
     shared = True
-    task_embedding = True
 
-    def __init__(self, image_size: int):
+    def __init__(self, image_size: int, task_embedding: bool = False):
         super().__init__()
         if image_size < _STRIDE or image_size % _STRIDE:
             raise AnyviewError(
                 f"architecture {self.architecture}: image size {image_size} must be a multiple of {_STRIDE}"
             )
         self.image_size = image_size
+        self.task_embedding = task_embedding
         self.encoder = KeypointEncoder()
-        self.translation = KeypointTranslation(self.width)
+        self.translation = KeypointTranslation(self.width, self.relative, task_embedding)
         self.decoder = KeypointDecoder()
 
     def encode_expert(self, frames: Tensor, noise: Generator | None = None) -> Tensor:
@@ -229,19 +242,27 @@ class KeypointTranslator(nn.Module):
         return seen.code, [frames, seen.code, seen.map]
 
     def task_frames(self, length: int) -> np.ndarray:
-        """Steps of a clip of ``length`` frames whose code T is given beside the present one: the first."""
-        return np.zeros(1, int)
+        """Steps of a clip of ``length`` frames whose codes T is given beside the present one.
+
+        The first; and with a task embedding the last, which tells where the task ends.
+        """
+        return np.array([0, length - 1] if self.task_embedding else [0])
+
+    def summarise(self, codes: Tensor) -> Tensor:
+        """What T is told of a clip, (N, F width), of the codes (N, F, width) of its ``task_frames``."""
+        return codes.flatten(1)
 
     def embed_task(self, z1: Tensor) -> Tensor:
-        """The code (1, width) of a clip's first frame, of its z1 (T, width)."""
-        return z1[:1]
+        """What T is told of a clip, (1, F width), of the codes z1 (T, width) of all its frames."""
+        return self.summarise(z1[self.task_frames(len(z1))][None])
 
     def translate(
         self, z1: Tensor, z2: Tensor, task: Tensor | None = None, noise: Generator | None = None
     ) -> Tensor:
-        """T: z3 (N, width) of z1 (N, width), z2 and ``task``, the expert's first z1, each (N or 1, width)."""
+        """T: z3 (N, width) of z1 (N, width), z2 (N or 1, width) and ``task``, what it is told of the clip."""
         assert task is not None
-        return self.translation(z1, z2.expand_as(z1), task.expand_as(z1))
+        told = [each.expand_as(z1) for each in task.split(self.width, dim=1)]
+        return self.translation(z1, z2.expand_as(z1), *told)
 
     def decode(self, z: Tensor, skips: list[Tensor]) -> Tensor:
         """Dec: frames (N, 3, H, W) of z (N, width) and skips of C contexts, row n in context n modulo C."""
@@ -252,19 +273,19 @@ class RelativeKeypointTranslator(KeypointTranslator):
     """The same, whose T is told relative places: its first two keypoints must be taught what they are."""
 
     architecture = "keypoint-relative"
-
-    def __init__(self, image_size: int):
-        super().__init__(image_size)
-        self.translation = KeypointTranslation(self.width, relative=True)
+    relative = True
 
 
-def relative_places(codes: Tensor, first: Tensor) -> Tensor:
+def relative_places(codes: Tensor, first: Tensor, ends: Tensor | None = None) -> Tensor:
     """Places (N, 2 K) of ``codes`` along and beside the way from the first to the second of ``first``'s.
 
-    In units of that way: the same for all points of view from above, and for all sizes. Those more than three
-    ways off count as that far.
+    With ``ends`` (N, 1, K) it leads to a mean of ``first``'s places, of these weights. In units of that way:
+    the same for all points of view from above, and for all sizes. Those more than three ways off count as
+    that far.
     """
-    start, end = _places(first)[:, :2].split(1, dim=1)  # (N, 1, 2) each
+    places = _places(first)
+    start = places[:, :1]  # (N, 1, 2)
+    end = places[:, 1:2] if ends is None else ends @ places
     way, offsets = end - start, _places(codes) - start
     square = way.square().sum(-1).clamp_min(_LEAST_WAY**2)
     along = (offsets * way).sum(-1) / square
@@ -317,6 +338,12 @@ def _layer(inputs: int, outputs: int, kernel: int, stride: int = 1) -> nn.Sequen
 
 def _doubling(inputs: int, outputs: int) -> nn.ConvTranspose2d:
     return nn.ConvTranspose2d(inputs, outputs, 4, 2, padding=1)
+
+
+def _ends(first: Tensor, last: Tensor, bias: Tensor) -> Tensor:
+    """How near each keypoint of ``first`` is to where the first one of ``last`` is: weights (N, 1, K)."""
+    squares = (_places(first) - _places(last)[:, :1]).square().sum(-1)
+    return (bias - squares / (2 * _NEAR**2)).softmax(-1)[:, None]
 
 
 def _places(code: Tensor) -> Tensor:

@@ -102,7 +102,7 @@ def batch_losses(
     decodings.
     """
     target = paired[len(context) :]
-    found: Tensor | float = 0.0
+    found = None
     if marks is not None and isinstance(model, KeypointTranslator):
         seen, first = model.encoder(paired), model.encoder(context)
         found = (2 * finding_loss(seen, marks.paired) + finding_loss(first, marks.context)) / 3
@@ -116,12 +116,13 @@ def batch_losses(
         # Without gradients a batch takes a quarter longer than with no embedding, and not twice as long. Enc1
         # learns from the frames of the pair what tells one end of the task from another.
         with torch.no_grad():
-            task = model.encode_expert(clip.flatten(0, 1)).unflatten(0, clip.shape[:2]).mean(1)
+            codes = model.encode_expert(clip.flatten(0, 1)).unflatten(0, clip.shape[:2])
+            task = model.summarise(codes)
     z3 = model.translate(z1, z2, task, noise)
     skip_terms = model.decoder.skip_terms(skips)
 
     places, drawn = None, z3
-    if marks is not None and isinstance(model, KeypointTranslator):
+    if found is not None and marks is not None:
         wanted_places = marks.paired[len(context) :]
         places = PLACE_SCALE * (found + place_loss(z3, wanted_places))
         # Dec learns to draw from the places that are right. Those found at first teach it to blur.

@@ -233,9 +233,13 @@ class ContextTranslator(nn.Module):
         count = _TASK_FRAMES if self.task_embedding else 0
         return ((np.arange(count) + 0.5) * length / max(count, 1)).astype(int)
 
+    def summarise(self, codes: Tensor) -> Tensor:
+        """The task embedding (N, width) of clips, of the codes (N, K, width) of their ``task_frames``."""
+        return codes.mean(1)
+
     def embed_task(self, z1: Tensor) -> Tensor | None:
         """The task embedding (1, width) of a clip, of its z1 (T, width); None where T is given none."""
-        return z1[self.task_frames(len(z1))].mean(0, keepdim=True) if self.task_embedding else None
+        return self.summarise(z1[self.task_frames(len(z1))][None]) if self.task_embedding else None
 
     def translate(
         self, z1: Tensor, z2: Tensor, task: Tensor | None = None, noise: Generator | None = None
