@@ -59,7 +59,8 @@ class TranslatorCell(WithExperts):
     mirror: bool = Field(default=False, description="mirror half of the clips during training")
     task_embedding: bool = Field(
         default=False,
-        description="give T the mean of Enc1 over 8 frames of the expert's clip; not in the thesis",
+        description="tell T of the expert's whole clip: by the mean of Enc1 over 8 frames, or for keypoints "
+        "by the last frame; not in the thesis",
     )
     learning_rate: Positive | None = Field(
         default=None, description="the cell's own instead of `training.learning_rate`"

@@ -2,7 +2,8 @@
 
 L_f(o_t) = -|Enc1(o_t) - mean_i T(Enc1(o_t^i), Enc2(o_0^a))|^2 over features, and
 L_i(o_t) = -|o_t - mean_i G(o_t^i, o_0^a)|^2 over pixels and colours in [-1, 1], for t = 1..T; the means are
-over the m demonstrations i, and o_0^a is the first frame of the agent a.
+over the m demonstrations i, and o_0^a is the first frame of the agent a. Of codes that are keypoints and
+more, only the keypoints' places are compared.
 """
 
 from collections.abc import Sequence
@@ -43,7 +44,7 @@ class DemonstrationReward(FixedReward):
         time_power: float,
         there: np.ndarray | None = None,
     ):
-        """Targets ``features`` (R, T, Z), ``images`` (R, T, 3, H, W); uint8 ``first_frames`` (R, H, W, 3).
+        """Targets ``features`` (R, T, F), ``images`` (R, T, 3, H, W); uint8 ``first_frames`` (R, H, W, 3).
 
         Where ``there`` (T + 1,) says that the clips have no frame, the reward is 0.
         """
@@ -56,7 +57,7 @@ class DemonstrationReward(FixedReward):
             self._weights *= torch.from_numpy(there[1:]).to(device)
         first = to_input(torch.from_numpy(first_frames).to(device))
         with torch.inference_mode():
-            still_features = ((model.encode_expert(first)[:, None] - features) ** 2).sum(-1)
+            still_features = ((model.features(model.encode_expert(first))[:, None] - features) ** 2).sum(-1)
             still_images = ((first[:, None] - images) ** 2).sum((2, 3, 4))
         feature_cost = (self._weights * still_features).mean(1, keepdim=True).clamp_min(1e-6)  # (R, 1)
         image_cost = (self._weights * still_images).mean(1, keepdim=True).clamp_min(1e-6)
@@ -76,7 +77,8 @@ class DemonstrationReward(FixedReward):
         seen = to_input(torch.from_numpy(frames).to(self._features.device))
         reward = torch.zeros(seen.shape[:2], device=seen.device)
         if self._feature_scale.any():
-            features = self._model.encode_expert(seen.flatten(0, 1)).unflatten(0, seen.shape[:2])
+            codes = self._model.encode_expert(seen.flatten(0, 1))
+            features = self._model.features(codes).unflatten(0, seen.shape[:2])
             reward -= self._feature_scale * ((features - self._features[:, None, step - 1]) ** 2).sum(-1)
         if self._image_scale.any():
             away = (seen - self._images[:, None, step - 1]).flatten(2)
@@ -103,7 +105,7 @@ def hold(clips: np.ndarray, there: np.ndarray) -> np.ndarray:
 def translate_demonstrations(
     model: Translator, demonstrations: np.ndarray, first_frames: np.ndarray
 ) -> tuple[Tensor, Tensor]:
-    """Mean translated features (R, T, Z) and frames (R, T, 3, H, W) for each agent's first frame.
+    """Mean translated features (R, T, F) and frames (R, T, 3, H, W) for each agent's first frame.
 
     ``demonstrations`` (m, T + 1, H, W, 3), or (R, m, ...) if each agent has its own, and ``first_frames``
     (R, H, W, 3) are uint8.
@@ -137,7 +139,7 @@ def _translate(
     for frame in first_frames:
         z2, skips = model.encode_context(to_input(torch.from_numpy(frame[None]).to(device)))
         translated = [model.translate(z1, z2, model.embed_task(z1)) for z1 in clips]
-        features.append(torch.stack(translated).mean(0))
+        features.append(torch.stack([model.features(z3) for z3 in translated]).mean(0))
         images.append(torch.stack([model.decode(z3, skips) for z3 in translated]).mean(0))
     return torch.stack(features), torch.stack(images)
 
@@ -146,7 +148,7 @@ def _translate(
 def true_demonstrations(model: Translator, clips: np.ndarray) -> tuple[Tensor, Tensor]:
     """The Oracle's targets: Enc1(o_t) and o_t of ``clips`` (R, T + 1, H, W, 3), each in its agent's view."""
     device = next(model.parameters()).device
-    features = torch.stack([_encode(model, clip[1:], device) for clip in clips])
+    features = torch.stack([model.features(_encode(model, clip[1:], device)) for clip in clips])
     return features, to_input(torch.from_numpy(clips[:, 1:]).to(device))
 
 

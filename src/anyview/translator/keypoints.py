@@ -31,7 +31,7 @@ _STRIDE = 8
 _NEAR = 0.15  # of where something ends
 _OUTSIDE = 1.1  # where what is outside of the picture counts as being
 _LEAST_WAY = 0.1  # between two keypoints, so that the same place twice is no division by nothing
-_COPIED = 5.0  # added to the mask of what stands still, so that at first most is copied
+_COPIED = 5.0  # what the mask of what stands still starts from, so that at first most is copied
 _SHIFTING = [0]  # keypoints that carry the first frame along: the object, see video/marks.py
 _TURNING = [2, 3]  # those from which lines do: from the tool to the wrist, and on to the elbow
 _SHORT = 0.05  # a line shorter than that has no direction
@@ -171,7 +171,10 @@ class KeypointDecoder(nn.Module):
         self.smooth = nn.ModuleList([_layer(middle, middle, 3), _layer(middle, middle, 3)])
         self.last_up = _doubling(middle, fine)
         copies = 1 + len(_SHIFTING) + len(_TURNING)  # of the first frame: where it was, and carried along
-        self.output = nn.Conv2d(fine + 3 * copies, 3 + copies + 1 + _STROKES, 3, padding=1)
+        self.layers = copies + 1, _STROKES
+        self.output = nn.Conv2d(fine + 3 * copies, 3 + sum(self.layers), 3, padding=1)
+        with torch.no_grad():
+            self.output.bias[3] += _COPIED  # type: ignore[index]
 
     def skip_terms(self, skips: list[Tensor]) -> DrawingTerms:
         """What ``forward`` needs of what ``KeypointTranslator.encode_context`` returns beside z2."""
@@ -198,12 +201,11 @@ class KeypointDecoder(nn.Module):
             x = smooth(activate(up(x) + skip))
         copies = torch.cat((first[:, None], _carry(first, before, _places(z))), 1)
         x = self.output(torch.cat((activate(self.last_up(x)), copies.flatten(1, 2).to(x.dtype)), 1)).float()
-        masks = torch.cat((x[:, 3:4] + _COPIED, x[:, 4:]), 1).softmax(1)
-        layers = torch.cat((copies, x[:, None, :3]), 1)
-        flat = masks[:, layers.shape[1] :].flatten(2)
+        drawn, masks = x.split((3, sum(self.layers)), 1)
+        whole, flat = masks.softmax(1).split(self.layers, 1)
+        layers = torch.cat((copies, drawn[:, None]), 1)
         colours = _looks(z)[..., :3].float().transpose(1, 2)
-        layered = (layers * masks[:, : layers.shape[1], None]).sum(1)
-        return layered + (colours @ flat).unflatten(2, first.shape[2:])
+        return (layers * whole[:, :, None]).sum(1) + (colours @ flat.flatten(2)).unflatten(2, first.shape[2:])
 
 
 class KeypointTranslator(nn.Module):
@@ -264,6 +266,13 @@ class KeypointTranslator(nn.Module):
         told = [each.expand_as(z1) for each in task.split(self.width, dim=1)]
         return self.translation(z1, z2.expand_as(z1), *told)
 
+    def features(self, z: Tensor) -> Tensor:
+        """What of z (N, width) a reward compares: the places, (N, 2 K).
+
+        How an arm looks where it is seen differs more from frame to frame than what a task is about.
+        """
+        return z[:, : 2 * KEYPOINTS]
+
     def decode(self, z: Tensor, skips: list[Tensor]) -> Tensor:
         """Dec: frames (N, 3, H, W) of z (N, width) and skips of C contexts, row n in context n modulo C."""
         return self.decoder(z, self.decoder.skip_terms(skips))
@@ -314,7 +323,7 @@ def finding_loss(seen: Seen, marks: Tensor) -> Tensor:
     axis = _axis(seen.map)
     edge, side = float(axis[-1]), len(axis)
     gaps = axis - marks.nan_to_num(0.0).clamp(-edge, edge)[..., None]  # (N, M, 2, side)
-    columns, rows = torch.exp(-0.5 * (0.5 * side / _SIGMA * gaps) ** 2).unbind(2)
+    columns, rows = _gaussian((0.5 * side / _SIGMA * gaps) ** 2).unbind(2)
     wanted = F.normalize((rows[..., None] * columns[..., None, :]).flatten(2), p=1, dim=-1)
     known = ~marks.isnan().any(-1)
     return place_loss(seen.code, marks) - _SHARPNESS * ((wanted * maps).sum(-1) * known).mean()
@@ -381,7 +390,12 @@ def _strokes(places: Tensor, like: Tensor) -> Tensor:
     """
     with torch.autocast(like.device.type, enabled=False):  # differences of squares need all digits
         squares = _squares(places.float(), torch.stack(_grid(like)).flatten(1))
-    return torch.exp(-0.5 * (0.5 * like.shape[-1] / _SIGMA) ** 2 * squares).unflatten(2, like.shape[2:])
+    return _gaussian((0.5 * like.shape[-1] / _SIGMA) ** 2 * squares).unflatten(2, like.shape[2:])
+
+
+def _gaussian(squares: Tensor) -> Tensor:
+    """exp(-x^2/2) of x^2, no smaller than 1e-35: below that processors count ten times as slowly."""
+    return torch.exp((-0.5 * squares).clamp_min(-80.0))
 
 
 def _squares(places: Tensor, grid: Tensor) -> Tensor:

@@ -248,6 +248,10 @@ class ContextTranslator(nn.Module):
         features = [z1, z2] if task is None else [z1, z2, task]
         return self.translation([each.expand_as(z1) for each in features], noise)
 
+    def features(self, z: Tensor) -> Tensor:
+        """What of z (N, width) a reward compares: all of it."""
+        return z
+
     def decode(self, z: Tensor, skips: list[Tensor]) -> Tensor:
         """Dec: frames (N, 3, H, W) of z (N, width) and the skips of K contexts, where K divides N.
 
