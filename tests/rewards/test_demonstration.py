@@ -13,6 +13,7 @@ from anyview.rewards.demonstration import (
     translate_demonstrations,
     true_demonstrations,
 )
+from anyview.translator.keypoints import KEYPOINTS, KeypointTranslator
 from anyview.translator.network import ContextTranslator
 from anyview.video.pixels import to_frames, to_input
 
@@ -139,6 +140,29 @@ def test_a_task_embedding_is_of_the_whole_clip(expert_clips, task_embedding: boo
     clips[:, 40:] = expert_clips[1, 40:]
     after, _ = translate_demonstrations(model, clips, first)
     assert torch.equal(before[:, 5], after[:, 5]) != task_embedding
+
+
+def test_of_keypoints_only_their_places_are_compared(expert_clips) -> None:
+    """By the equation, and whatever the rest of the code says."""
+    torch.manual_seed(0)
+    model = KeypointTranslator(32).eval().requires_grad_(False)
+    model.encoder.heat.weight.mul_(30)  # so that places differ
+    clips, first, frame = expert_clips[:2], expert_clips[3:, 0], expert_clips[4, 20]
+
+    def feature_loss() -> float:
+        targets = translate_demonstrations(model, clips, first)
+        reward = DemonstrationReward(model, *targets, first, RewardWeights(feature=1.0, image=0.0), 0.0)
+        seen = np.stack([first[0], frame])[:, None]
+        return float(reward.step(seen, 30)[1, 0] * reward.scales[1])
+
+    z2, _ = model.encode_context(to_input(first[1:2]))
+    codes = [model.encode_expert(to_input(clip[[0, 30]])) for clip in clips]
+    moved = [model.translate(z1[1:], z2, z1[:1])[0, : 2 * KEYPOINTS] for z1 in codes]
+    found = model.encode_expert(to_input(frame[None]))[0, : 2 * KEYPOINTS]
+    assert feature_loss() == pytest.approx(-float((found - sum(moved) / 2).square().sum()), rel=1e-4)
+    before = feature_loss()
+    model.translation.steps.bias[2 * KEYPOINTS :] += 1
+    assert feature_loss() == before
 
 
 def test_each_agent_may_have_clips_of_its_own(translator, expert_clips) -> None:
