@@ -99,9 +99,9 @@ def test_tables_tell_of_every_cell(beyond, params):
     for rows in tables:
         assert {row.count(" | ") for row in rows} == {rows[0].count(" | ")}
     rows = {row.split(" | ")[0]: row for row in tables[-1]}
-    assert rows["| `clips-5`"].split(" | ")[1:3] == ["5", "all"]
-    assert rows["| `clips-every-4`"].split(" | ")[1:3] == ["20", "1 in 4"]
-    assert rows["| `clips-two-thirds`"].split(" | ")[1:3] == ["20", "first 67%"]
+    assert rows["| `clips-5`"].split(" | ")[2:4] == ["5", "all"]
+    assert rows["| `clips-every-4`"].split(" | ")[2:4] == ["20", "1 in 4"]
+    assert rows["| `clips-two-thirds`"].split(" | ")[2:4] == ["20", "first 67%"]
     by_angle, by_reward = tables[5:7]
     assert [row.split(" | ")[:2] for row in by_angle[2:]] == [
         [f"| {name} (one clip)", f"{angle}°"] for name in ("Ours", "Choice") for angle in (0, 90, 180)
