@@ -148,7 +148,7 @@ def _fitting_model(params: Params, dataset: str) -> Path:
     cells = {
         name: cell
         for name, cell in params.translator_cells.items()
-        if (cell.dataset == dataset and _has_every_loss(cell.weights)) or cell.other_experts == dataset
+        if (cell.other_experts or cell.dataset) == dataset and _has_every_loss(cell.weights)
     }
     trained = [name for name in cells if (paths.model(name) / "model.json").is_file()]
     if not trained:
@@ -163,7 +163,9 @@ def _fitting_model(params: Params, dataset: str) -> Path:
 
 
 def _has_every_loss(weights: LossWeights) -> bool:
-    return min(weights.translation, weights.reconstruction, weights.alignment) > 0
+    """Of keypoints that are taught nobody asks for L_rec: it falls to nothing without a better translation."""
+    encoding = max(weights.reconstruction, weights.places)
+    return min(weights.translation, encoding, weights.alignment) > 0
 
 
 def _one_run(params: Params, model: Path, dataset: str, size: int, seed: int, episodes: int) -> Params:
