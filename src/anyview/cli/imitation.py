@@ -163,7 +163,7 @@ def _fitting_model(params: Params, dataset: str) -> Path:
 
 
 def _has_every_loss(weights: LossWeights) -> bool:
-    """Of keypoints that are taught nobody asks for L_rec: it falls to nothing without a better translation."""
+    """Keypoints that are taught need no L_rec: it falls to nothing without a better translation."""
     encoding = max(weights.reconstruction, weights.places)
     return min(weights.translation, encoding, weights.alignment) > 0
 
