@@ -13,7 +13,8 @@ from anyview.rewards.demonstration import (
     translate_demonstrations,
     true_demonstrations,
 )
-from anyview.translator.keypoints import KEYPOINTS, KeypointTranslator
+from anyview.translator.keypoints.codes import KEYPOINTS
+from anyview.translator.keypoints.translator import KeypointTranslator
 from anyview.translator.network import ContextTranslator
 from anyview.video.pixels import to_frames, to_input
 

@@ -15,20 +15,12 @@ from anyview.seeds import stream
 from anyview.training.augmentation import mirror
 from anyview.training.common.fit import fit
 from anyview.training.translator import TranslatorObjective
-from anyview.translator.architectures import make_translator
-from anyview.translator.keypoints import (
-    KEYPOINTS,
-    KeypointTranslator,
-    RelativeKeypointTranslator,
-    Seen,
-    _carry,
-    _ends,
-    _strokes,
-    finding_loss,
-    place_loss,
-    relative_places,
-    with_places,
-)
+from anyview.translator.architectures import embed_task, make_translator
+from anyview.translator.keypoints.codes import KEYPOINTS, draw_strokes, with_places
+from anyview.translator.keypoints.decoder import _carry
+from anyview.translator.keypoints.encoder import Seen, finding_loss, place_loss
+from anyview.translator.keypoints.translation import _ends, relative_places
+from anyview.translator.keypoints.translator import KeypointTranslator, RelativeKeypointTranslator
 from anyview.translator.losses import Marks
 from anyview.translator.weights import load_translator, save_translator
 from anyview.video.marks import write_marks
@@ -51,11 +43,11 @@ def test_one_context_serves_a_clip_and_several_serve_in_turn(model):
     with torch.no_grad():
         z1 = model.encode_expert(clip)
         z2, skips = model.encode_context(contexts)
-        z3 = model.translate(z1, z2.repeat(3, 1), model.embed_task(z1))
+        z3 = model.translate(z1, z2.repeat(3, 1), embed_task(model, z1))
         both = model.decode(z3, skips)
         for row in range(6):
             alone_z2, alone = model.encode_context(contexts[row % 2 : row % 2 + 1])
-            alone_z3 = model.translate(z1[row : row + 1], alone_z2, model.embed_task(z1))
+            alone_z3 = model.translate(z1[row : row + 1], alone_z2, embed_task(model, z1))
             torch.testing.assert_close(model.decode(alone_z3, alone)[0], both[row], atol=1e-4, rtol=1e-4)
 
 
@@ -72,7 +64,7 @@ def test_at_first_the_context_is_copied_more_than_painted_over(model):
 @given(hnp.arrays(np.float32, (1, KEYPOINTS, 2), elements=st.floats(-1.25, 1.25, width=32)))
 def test_strokes_are_gaussians_around_places_and_lines(places):
     """Against the distance of each pixel's centre from a point, or from a dense row of points."""
-    made = _strokes(torch.from_numpy(places), torch.zeros(1, 1, 12, 12))[0].numpy()
+    made = draw_strokes(torch.from_numpy(places), torch.zeros(1, 1, 12, 12))[0].numpy()
     centres = (2 * np.arange(12) + 1) / 12 - 1
     pixels = np.stack(np.meshgrid(centres, centres), -1)
     lines = [a + (b - a) * np.linspace(0, 1, 400)[:, None] for a, b in pairwise(places[0])]
@@ -197,7 +189,7 @@ def test_it_learns_where_things_go_and_draws_them_there(make_objective, discs, p
         for target in targets:
             true = to_input(discs.frames[target])
             z2, skips = model.encode_context(true[:1])
-            z3 = model.translate(z1, z2, model.embed_task(z1))
+            z3 = model.translate(z1, z2, embed_task(model, z1))
             found = ((z3[:, :2] + 1) * SIZE / 2 - 0.5).numpy()
             place = marked.marks[target, :, 0]
             off.append(np.linalg.norm(found - place, axis=1).mean())
@@ -261,7 +253,7 @@ def test_the_last_frame_tells_t_something_only_with_a_task_embedding(
     with torch.no_grad():
         z2, _ = model.encode_context(context)
         made = [
-            model.translate(z1, z2, model.embed_task(z1))[:4]
+            model.translate(z1, z2, embed_task(model, z1))[:4]
             for z1 in map(model.encode_expert, (clip, other))
         ]
     assert torch.equal(*made) != task_embedding

@@ -15,7 +15,7 @@ from anyview.assessment.yardsticks import yardsticks
 from anyview.config import Assessment
 from anyview.runtime.device import torch_device, use_threads, worker_count
 from anyview.runtime.progress import track
-from anyview.translator.architectures import Translator
+from anyview.translator.architectures import Translator, embed_task
 from anyview.translator.losses import NAMES, alignment_loss, frame_loss
 from anyview.video.datasets import Dataset, clip_pairs
 from anyview.video.files import write_video
@@ -41,7 +41,7 @@ def translate_clip(model: Translator, clip: np.ndarray, context: np.ndarray) -> 
     z2, skips = model.encode_context(to_input(context[None]).to(device))
     parts = np.array_split(clip, -(-len(clip) // 64))
     encoded = [model.encode_expert(to_input(frames).to(device)) for frames in parts]
-    task = model.embed_task(torch.cat(encoded))
+    task = embed_task(model, torch.cat(encoded))
     return np.concatenate([to_frames(model.decode(model.translate(z1, z2, task), skips)) for z1 in encoded])
 
 
@@ -58,7 +58,7 @@ def evaluate_clip(model: Translator, dataset: Dataset, source: int, target: int)
     z2, skips = model.encode_context(true[:1])
     z_true = model.encode_expert(true)
     z1 = model.encode_expert(expert)
-    z3 = model.translate(z1, z2, model.embed_task(z1))
+    z3 = model.translate(z1, z2, embed_task(model, z1))
     skip_terms = model.decoder.skip_terms(skips)
     translated = model.decoder(z3, skip_terms)
     losses = [

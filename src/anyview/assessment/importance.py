@@ -7,7 +7,7 @@ import pandas as pd
 import torch
 
 from anyview.runtime.device import worker_count
-from anyview.translator.architectures import Translator
+from anyview.translator.architectures import Translator, embed_task
 from anyview.translator.losses import FRAME_SCALE
 from anyview.video.datasets import Dataset
 from anyview.video.pixels import to_input
@@ -45,7 +45,7 @@ def _rises(model: Translator, dataset: Dataset, pair: tuple[int, int], offsets: 
     clips = dataset.expert_clip(source), dataset.frames[target]
     expert, true = (to_input(clip).to(device) for clip in clips)
     z1 = model.encode_expert(expert)
-    task = model.embed_task(z1)  # of the clip as it is: a frame is replaced where T reads its time step
+    task = embed_task(model, z1)  # of the clip as it is: a frame is replaced where T reads its time step
     z2, skips = model.encode_context(true[:1])
     skip_terms = model.decoder.skip_terms(skips)
 

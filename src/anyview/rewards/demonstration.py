@@ -14,7 +14,7 @@ from torch import Tensor
 
 from anyview.config import Incomplete, RewardWeights
 from anyview.rewards.fixed import FixedReward
-from anyview.translator.architectures import Translator
+from anyview.translator.architectures import Translator, embed_task
 from anyview.video.pixels import to_frames, to_input
 
 _BATCH = 64
@@ -138,7 +138,7 @@ def _translate(
     features, images = [], []
     for frame in first_frames:
         z2, skips = model.encode_context(to_input(torch.from_numpy(frame[None]).to(device)))
-        translated = [model.translate(z1, z2, model.embed_task(z1)) for z1 in clips]
+        translated = [model.translate(z1, z2, embed_task(model, z1)) for z1 in clips]
         features.append(torch.stack([model.features(z3) for z3 in translated]).mean(0))
         images.append(torch.stack([model.decode(z3, skips) for z3 in translated]).mean(0))
     return torch.stack(features), torch.stack(images)

@@ -13,7 +13,9 @@ from torch.nn import functional as F
 
 from anyview.config import LossWeights
 from anyview.translator.architectures import Translator
-from anyview.translator.keypoints import KeypointTranslator, finding_loss, place_loss, with_places
+from anyview.translator.keypoints.codes import with_places
+from anyview.translator.keypoints.encoder import finding_loss, place_loss
+from anyview.translator.keypoints.translator import KeypointTranslator
 
 FRAME_SCALE = 100 / 2
 ALIGNMENT_SCALE = 1000

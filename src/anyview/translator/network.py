@@ -237,10 +237,6 @@ class ContextTranslator(nn.Module):
         """The task embedding (N, width) of clips, of the codes (N, K, width) of their ``task_frames``."""
         return codes.mean(1)
 
-    def embed_task(self, z1: Tensor) -> Tensor | None:
-        """The task embedding (1, width) of a clip, of its z1 (T, width); None where T is given none."""
-        return self.summarise(z1[self.task_frames(len(z1))][None]) if self.task_embedding else None
-
     def translate(
         self, z1: Tensor, z2: Tensor, task: Tensor | None = None, noise: Generator | None = None
     ) -> Tensor:
