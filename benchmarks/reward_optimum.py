@@ -63,8 +63,8 @@ def main() -> None:
         seen = to_input(torch.from_numpy(camera.render_clip(context, moved)))
         still = to_input(torch.from_numpy(first[run : run + 1]))
         with torch.inference_mode():
-            feature = _squares(model.features(model.encode_expert(seen)), features[run, -1])
-            feature /= _squares(model.features(model.encode_expert(still)), features[run]).mean()
+            feature = _squares(model.expert_features(seen), features[run, -1])
+            feature /= _squares(model.expert_features(still), features[run]).mean()
         image = _squares(seen, images[run, -1]) / _squares(still, images[run]).mean()
         for name, cost in zip(costs, (feature, image, (feature + phi * image) / (1 + phi)), strict=True):
             costs[name].append(cost.numpy())

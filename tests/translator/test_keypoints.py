@@ -38,6 +38,14 @@ def frames(count: int, size: int = 16) -> torch.Tensor:
     return torch.rand(count, 3, size, size, generator=torch.Generator().manual_seed(5)) * 2 - 1
 
 
+def test_features_of_frames_are_those_of_their_codes(model):
+    frames = to_input(torch.randint(0, 256, (3, 16, 16, 3), dtype=torch.uint8))
+    with torch.no_grad():
+        found = model.expert_features(frames)
+        assert found.shape == (3, 2 * KEYPOINTS)
+        torch.testing.assert_close(found, model.features(model.encode_expert(frames)), rtol=0, atol=1e-6)
+
+
 def test_one_context_serves_a_clip_and_several_serve_in_turn(model):
     contexts, clip = frames(2), frames(6)
     with torch.no_grad():

@@ -6,7 +6,7 @@ over the m demonstrations i, and o_0^a is the first frame of the agent a. Of cod
 more, only the keypoints' places are compared.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import torch
@@ -57,7 +57,7 @@ class DemonstrationReward(FixedReward):
             self._weights *= torch.from_numpy(there[1:]).to(device)
         first = to_input(torch.from_numpy(first_frames).to(device))
         with torch.inference_mode():
-            still_features = ((model.features(model.encode_expert(first))[:, None] - features) ** 2).sum(-1)
+            still_features = ((model.expert_features(first)[:, None] - features) ** 2).sum(-1)
             still_images = ((first[:, None] - images) ** 2).sum((2, 3, 4))
         feature_cost = (self._weights * still_features).mean(1, keepdim=True).clamp_min(1e-6)  # (R, 1)
         image_cost = (self._weights * still_images).mean(1, keepdim=True).clamp_min(1e-6)
@@ -77,8 +77,7 @@ class DemonstrationReward(FixedReward):
         seen = to_input(torch.from_numpy(frames).to(self._features.device))
         reward = torch.zeros(seen.shape[:2], device=seen.device)
         if self._feature_scale.any():
-            codes = self._model.encode_expert(seen.flatten(0, 1))
-            features = self._model.features(codes).unflatten(0, seen.shape[:2])
+            features = self._model.expert_features(seen.flatten(0, 1)).unflatten(0, seen.shape[:2])
             reward -= self._feature_scale * ((features - self._features[:, None, step - 1]) ** 2).sum(-1)
         if self._image_scale.any():
             away = (seen - self._images[:, None, step - 1]).flatten(2)
@@ -116,7 +115,7 @@ def translate_demonstrations(
         features, images = zip(*parts, strict=True)
         return torch.cat(features), torch.cat(images)
     device = next(model.parameters()).device
-    clips = [_encode(model, clip[1:], device) for clip in demonstrations]
+    clips = [_in_parts(model.encode_expert, clip[1:], device) for clip in demonstrations]
     return _translate(model, clips, first_frames, device)
 
 
@@ -127,7 +126,7 @@ def translate_clock(model: Translator, clips: np.ndarray, first_frames: np.ndarr
     Shapes as of ``translate_demonstrations``.
     """
     device = next(model.parameters()).device
-    mean = torch.stack([_encode(model, clip[1:], device) for clip in clips]).mean(0)
+    mean = torch.stack([_in_parts(model.encode_expert, clip[1:], device) for clip in clips]).mean(0)
     return _translate(model, [mean], first_frames, device)
 
 
@@ -148,11 +147,13 @@ def _translate(
 def true_demonstrations(model: Translator, clips: np.ndarray) -> tuple[Tensor, Tensor]:
     """The Oracle's targets: Enc1(o_t) and o_t of ``clips`` (R, T + 1, H, W, 3), each in its agent's view."""
     device = next(model.parameters()).device
-    features = torch.stack([model.features(_encode(model, clip[1:], device)) for clip in clips])
+    features = torch.stack([_in_parts(model.expert_features, clip[1:], device) for clip in clips])
     return features, to_input(torch.from_numpy(clips[:, 1:]).to(device))
 
 
-def _encode(model: Translator, frames: Sequence[np.ndarray] | np.ndarray, device: torch.device) -> Tensor:
-    """Enc1 (N, Z) of uint8 frames (N, H, W, 3), a bounded batch at a time."""
+def _in_parts(
+    encode: Callable[[Tensor], Tensor], frames: Sequence[np.ndarray] | np.ndarray, device: torch.device
+) -> Tensor:
+    """What ``encode`` makes of uint8 frames (N, H, W, 3), a bounded batch at a time."""
     pixels = torch.from_numpy(np.ascontiguousarray(frames)).to(device)
-    return torch.cat([model.encode_expert(to_input(part)) for part in pixels.split(_BATCH)])
+    return torch.cat([encode(to_input(part)) for part in pixels.split(_BATCH)])

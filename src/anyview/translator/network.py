@@ -248,6 +248,10 @@ class ContextTranslator(nn.Module):
         """What of z (N, width) a reward compares: all of it."""
         return z
 
+    def expert_features(self, frames: Tensor) -> Tensor:
+        """``features`` of the z1 of ``frames`` (N, 3, H, W)."""
+        return self.encode_expert(frames)
+
     def decode(self, z: Tensor, skips: list[Tensor]) -> Tensor:
         """Dec: frames (N, 3, H, W) of z (N, width) and the skips of K contexts, where K divides N.
 

@@ -55,20 +55,33 @@ class KeypointEncoder(nn.Module):
         self.vector = nn.Linear(coarse, VECTOR)
 
     def forward(self, frames: Tensor) -> Seen:
+        x, pooled = self._maps(frames)
+        logits, places = self._find(x)
+        strokes = draw_strokes(places.detach(), x).flatten(2)
+        seen = torch.cat((F.avg_pool2d(frames, 2), self.look(x)), 1)
+        looks = F.normalize(strokes, p=1, dim=-1, eps=1.0) @ seen.flatten(2).transpose(1, 2).float()
+        return Seen(torch.cat((places.flatten(1), self.vector(pooled), looks.flatten(1)), 1), x, logits)
+
+    def places(self, frames: Tensor) -> Tensor:
+        """The places in the code of ``frames`` (N, 3, H, W) by themselves, (N, 2 K): a third faster."""
+        return self._find(self._maps(frames)[0])[1].flatten(1)
+
+    def _maps(self, frames: Tensor) -> tuple[Tensor, Tensor]:
+        """The finest map (N, 16, H/2, W/2), and the means of the coarsest (N, 64)."""
         fine, middle, coarse = self._shrink(frames)
         x = self.deep(coarse)
         pooled = x.mean((2, 3))
         x = x + self.everywhere(pooled)[:, :, None, None]
         for skip, lateral, up, smooth in zip((middle, fine), self.lateral, self.up, self.smooth, strict=True):
             x = smooth(activate(F.interpolate(up(x), scale_factor=2.0) + lateral(skip)))
+        return x, pooled
+
+    def _find(self, x: Tensor) -> tuple[Tensor, Tensor]:
+        """Logits (N, K, H/2 * W/2) and places (N, K, 2) of the keypoints, of the finest map ``x``."""
         logits = self.heat(x).flatten(2).float()  # places need more digits than bfloat16 has
         where = logits.softmax(-1).unflatten(2, x.shape[2:])
         axis = axis_of(x)
-        places = torch.stack(((where.sum(2) * axis).sum(-1), (where.sum(3) * axis).sum(-1)), -1)
-        strokes = draw_strokes(places.detach(), x).flatten(2)
-        seen = torch.cat((F.avg_pool2d(frames, 2), self.look(x)), 1)
-        looks = F.normalize(strokes, p=1, dim=-1, eps=1.0) @ seen.flatten(2).transpose(1, 2).float()
-        return Seen(torch.cat((places.flatten(1), self.vector(pooled), looks.flatten(1)), 1), x, logits)
+        return logits, torch.stack(((where.sum(2) * axis).sum(-1), (where.sum(3) * axis).sum(-1)), -1)
 
     def _shrink(self, x: Tensor) -> list[Tensor]:
         maps = []
