@@ -193,3 +193,40 @@ def test_the_front_page_has_the_numbers_of_the_landed_metrics():
         expected.append((cell, success, "{:.1f} [{:.1f}, {:.1f}]".format(*metres), compared))
     page = (ROOT / "README.md").read_text(encoding="utf-8")
     assert re.findall(r"^\| \**`([\w-]+)`.* \| (\d+/.*?) \| (.*?) \| (.*?) \|$", page, re.M) == expected
+
+
+def test_the_front_page_has_the_numbers_of_what_goes_beyond_the_thesis():
+    """Of every question that it answers, and of the real clips among its limits."""
+    beyond = json.loads((ROOT / "beyond/metrics/beyond.json").read_text(encoding="utf-8"))
+    real = json.loads((ROOT / "metrics/translation.json").read_text(encoding="utf-8"))
+    page = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+
+    def count(numbers: dict[str, float], rate: str = "success_rate") -> str:
+        return f"{round(numbers[rate] * numbers['runs'])}/{numbers['runs']:.0f}"
+
+    def centimetres(numbers: dict[str, float]) -> str:
+        return f"{100 * numbers['final_distance_median']:.1f} cm"
+
+    choice, methods, tasks = beyond["choice"], beyond["imitation"], beyond["tasks"]
+    shown, oracle, clock = (
+        count(choice[cell], "shown_rate") for cell in ("choice", "choice-oracle", "choice-clock")
+    )
+    other = count(choice["choice"], "other_rate").split("/")[0]
+    human, xirl = methods["human"], methods["human-xirl"]
+    ours, true = (
+        ", ".join(count(tasks[f"{task}{end}"]) for task in ("reach", "strike", "sweep"))
+        for end in ("", "-oracle")
+    )
+    placed = {
+        (cell, clips): f"{100 * real[cell][clips]['placed']:.0f}%"
+        for cell in ("real-adam", "real-pretrained")
+        for clips in ("validation", "extreme")
+    }
+    told = [
+        f"{shown} end at the shown goal, {other} at the other; {oracle} by the true view, {clock} by the clock",
+        f"{count(human)}, median {centimetres(human)}; {count(xirl)}, {centimetres(xirl)}",
+        f"{ours} ({true})",
+        f"in {placed['real-adam', 'validation']} of held-out frames",
+        f"has {placed['real-pretrained', 'validation']}, and {placed['real-pretrained', 'extreme']} where",
+    ]
+    assert [line for line in told if line not in page] == []
