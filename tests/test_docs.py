@@ -223,7 +223,8 @@ def test_the_front_page_has_the_numbers_of_what_goes_beyond_the_thesis():
         for clips in ("validation", "extreme")
     }
     told = [
-        f"{shown} end at the shown goal, {other} at the other; {oracle} by the true view, {clock} by the clock",
+        f"{shown} end at the shown goal, {other} at the other; "
+        f"{oracle} by the true view, {clock} by the clock",
         f"{count(human)}, median {centimetres(human)}; {count(xirl)}, {centimetres(xirl)}",
         f"{ours} ({true})",
         f"in {placed['real-adam', 'validation']} of held-out frames",
