@@ -310,6 +310,14 @@ def test_what_a_method_beyond_depends_on_is_written_in_full(cell):
     written = params.imitating(cell).model_dump()["imitation"]
     assert written["cells"] == {cell: params.beyond.cells[cell].model_dump()}
     assert written["demonstrations"] == VALUES["beyond"]["cells"][cell]["demonstrations"]
+    assert written["ddpg"]["discount"] == VALUES["imitation"]["ddpg"]["discount"]
+
+
+def test_a_cell_beyond_may_look_farther_ahead_than_its_learner():
+    values = changed(("beyond", "cells", "human", "discount"), 0.9)
+    params = parse_params(values)
+    assert params.imitating("human").imitation.ddpg.discount == 0.9
+    assert params.imitation.ddpg.discount == VALUES["imitation"]["ddpg"]["discount"]
 
 
 def test_further_mistakes_are_counted():

@@ -7,6 +7,8 @@ from pydantic import Field
 from anyview.config.data import DemonstrationSet, Real, Simulate, SplitSet
 from anyview.config.evidence import Evidence
 from anyview.config.imitation import (
+    DDPG,
+    TRPO,
     Adversarial,
     AdversarialCell,
     BeyondCell,
@@ -101,13 +103,16 @@ class Params(Block):
         )
 
     def imitating(self, name: str) -> "Params":
-        """These params with the cell ``name`` of `beyond` as one of `imitation`, with its clips and runs."""
+        """These params with the cell ``name`` of `beyond` as one of `imitation`, with what it sets itself."""
         cell = self.beyond.cells[name]
+        learner: DDPG | TRPO = getattr(self.imitation, cell.learner)
+        discount = learner.discount if cell.discount is None else cell.discount
         changed = {
             "dataset": cell.dataset,
             "demonstrations": cell.demonstrations,
             "runs": cell.runs or self.imitation.runs,
             "cells": {name: cell},
+            cell.learner: learner.model_copy(update={"discount": discount}),
         }
         return self.model_copy(update={"imitation": self.imitation.model_copy(update=changed)})
 
