@@ -111,6 +111,7 @@ class Params(Block):
             "dataset": cell.dataset,
             "demonstrations": cell.demonstrations,
             "runs": cell.runs or self.imitation.runs,
+            "iterations": cell.iterations or self.imitation.iterations,
             "cells": {name: cell},
             cell.learner: learner.model_copy(update={"discount": discount}),
         }
