@@ -313,14 +313,20 @@ def test_what_a_method_beyond_depends_on_is_written_in_full(cell):
     assert written["ddpg"]["discount"] == VALUES["imitation"]["ddpg"]["discount"]
 
 
-def test_a_cell_beyond_may_learn_longer_and_look_farther_ahead_than_others():
+def test_a_cell_beyond_may_look_farther_ahead_than_its_learner():
     values = changed(("beyond", "cells", "human", "discount"), 0.9)
-    values["beyond"]["cells"]["human"]["iterations"] = 7
     params = parse_params(values)
-    human, other = params.imitating("human").imitation, params.imitating("human-xirl").imitation
-    assert (human.ddpg.discount, human.iterations) == (0.9, 7)
-    assert other.ddpg.discount == VALUES["imitation"]["ddpg"]["discount"]
-    assert other.iterations == VALUES["imitation"]["iterations"]
+    assert params.imitating("human").imitation.ddpg.discount == 0.9
+    assert params.imitation.ddpg.discount == VALUES["imitation"]["ddpg"]["discount"]
+
+
+def test_what_goes_beyond_has_an_own_length_of_runs():
+    values = changed(("beyond", "iterations"), 7)
+    values["beyond"]["episodes_per_iteration"] = 3
+    params = parse_params(values)
+    for beyond in params.imitating("human"), params.going_beyond("ours"):
+        assert (beyond.imitation.iterations, beyond.imitation.episodes_per_iteration) == (7, 3)
+    assert params.imitation.iterations == VALUES["imitation"]["iterations"]
 
 
 def test_further_mistakes_are_counted():

@@ -205,7 +205,6 @@ class BeyondMethodCell(WithExperts, MethodCell):
         default="evaluation", description="the random stream that the contexts are drawn from"
     )
     runs: Count | None = Field(default=None, description="how many contexts, instead of `imitation.runs`")
-    iterations: Count | None = Field(default=None, description="instead of `imitation.iterations`")
     discount: Discount | None = Field(default=None, description="instead of the learner's own")
     angles: list[Annotated[int, Field(ge=0, le=180)]] = Field(
         default=[],

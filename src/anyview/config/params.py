@@ -1,6 +1,6 @@
 """The whole of ``params.yaml``."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -52,6 +52,8 @@ class Beyond(Block):
     split: dict[Name, SplitSet]
     translators: dict[Name, TranslatorCell]
     embeddings: dict[Name, CycleCell]
+    iterations: Count = Field(description="of the policies, instead of `imitation.iterations`")
+    episodes_per_iteration: Count = Field(description="instead of `imitation.episodes_per_iteration`")
     cells: dict[Name, Annotated[BeyondCell | GoalCell, Field(discriminator="reward")]]
     ranking: Ranking
 
@@ -97,7 +99,7 @@ class Params(Block):
                 "split": self.beyond.split,
                 "translators": self.beyond.translators,
                 "embeddings": {},
-                "imitation": self.imitation.model_copy(update={"cells": cells}),
+                "imitation": self._imitation_beyond(cells=cells),
                 "adversarial": self.adversarial.model_copy(update={"cells": {}}),
             }
         )
@@ -111,11 +113,15 @@ class Params(Block):
             "dataset": cell.dataset,
             "demonstrations": cell.demonstrations,
             "runs": cell.runs or self.imitation.runs,
-            "iterations": cell.iterations or self.imitation.iterations,
             "cells": {name: cell},
             cell.learner: learner.model_copy(update={"discount": discount}),
         }
-        return self.model_copy(update={"imitation": self.imitation.model_copy(update=changed)})
+        return self.model_copy(update={"imitation": self._imitation_beyond(**changed)})
+
+    def _imitation_beyond(self, **changed: Any) -> Imitation:
+        """`imitation` as of `beyond`, with what is ``changed``."""
+        own = {name: getattr(self.beyond, name) for name in ("iterations", "episodes_per_iteration")}
+        return self.imitation.model_copy(update=own | changed)
 
     @property
     def methods(self) -> dict[str, DemonstrationCell | EmbeddingRewardCell | GoalCell | AdversarialCell]:
