@@ -17,6 +17,7 @@ from anyview.pusher.contexts import Kind, sample_contexts
 from anyview.pusher.expert import roll_out
 from anyview.pusher.render import renderer
 from anyview.pusher.task import load_task
+from anyview.pusher.tempo import draw_progress
 from anyview.runtime.errors import choose, run_stage
 from anyview.runtime.once import once
 from anyview.runtime.outputs import whole_folder, write_atomically
@@ -28,7 +29,15 @@ from anyview.video.sets import StoredFile, write_set, write_shard
 
 
 def simulate_shard(
-    folder: Path, seed: int, name: str, task: str, kind: Kind, index: int, count: int, image_size: int
+    folder: Path,
+    seed: int,
+    name: str,
+    task: str,
+    kind: Kind,
+    varied: bool,
+    index: int,
+    count: int,
+    image_size: int,
 ) -> dict[str, Any]:
     """Make shard ``index`` of the set ``name``, of ``count`` demonstrations, unless an earlier try did.
 
@@ -38,7 +47,8 @@ def simulate_shard(
     def make() -> tuple[dict[str, Any], list[str]]:
         rng = stream(seed, f"demonstrations/{name}", index)
         contexts, acceptance = sample_contexts(rng, count, kind, task)
-        positions, distances = roll_out(contexts)
+        progress = draw_progress(rng, count, load_task(task)) if varied else None
+        positions, distances = roll_out(contexts, progress)
         camera = renderer(task, image_size)
         clips = [camera.render_clip(*scene) for scene in zip(contexts, positions, strict=True)]
         stored = write_shard(folder, index, np.stack(clips))
@@ -52,6 +62,7 @@ def simulate_shard(
                 "context": context.to_json(),
             }
             | ({"choice": context.choice.colour} if context.choice else {})
+            | ({} if progress is None else {"progress": " ".join(map(str, progress[position]))})
             for position, (context, distance) in enumerate(zip(contexts, distances, strict=True))
         ]
         return {"file": vars(stored), "rows": rows, "acceptance": acceptance}, [stored.file]
@@ -65,7 +76,7 @@ def main(arguments: list[str]) -> None:
     sets = params.demonstration_sets
     name = choose(arguments, sets, "python stages/simulate.py SET")
     wanted, shard, size = sets[name], params.simulate.shard, params.sim.image_size
-    what = (params.base.seed, name, wanted.task, wanted.contexts)
+    what = (params.base.seed, name, wanted.task, wanted.contexts, wanted.tempo == "varied")
     folder = checkpoint_folder(["simulate", *what, shard, size])
 
     counts = [min(shard, wanted.demos - first) for first in range(0, wanted.demos, shard)]

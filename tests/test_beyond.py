@@ -2,11 +2,16 @@
 
 import json
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from anyview.config import load_params
 from anyview.learners.common.policies import load_policy
+from anyview.pusher.contexts import Context
+from anyview.pusher.expert import roll_out
+from anyview.pusher.render import renderer
+from anyview.video.sets import open_frames
 from tests.conftest import Study
 
 pytestmark = pytest.mark.slow
@@ -52,6 +57,19 @@ def test_a_robot_imitates_held_out_clips_of_a_hand(beyond):
     translated = pd.read_csv(beyond.folder / "data/translations/sim-human/clips.csv")
     assert set(split[translated["source"]]) == {"validation"}
     assert translated["clip"].str.startswith("diverse").all()
+
+
+def test_clips_of_a_tempo_of_their_own_are_what_their_manifest_tells(beyond):
+    folder = beyond.folder / "data/clips/tempo"
+    store = open_frames(folder)
+    contexts = [Context.from_json(text) for text in store.manifest["context"][:3]]
+    progress = np.array([text.split() for text in store.manifest["progress"][:3]], float)
+    positions, distances = roll_out(contexts, progress)
+    camera = renderer("push", store.frames.shape[2])
+    for row, scene in enumerate(zip(contexts, positions, strict=True)):
+        assert np.array_equal(store.frames[row], camera.render_clip(*scene))
+    assert list(distances) == list(store.manifest["final_distance"][:3])
+    assert store.manifest["progress"].nunique() == len(store.manifest)
 
 
 def test_each_context_is_run_for_both_goals_and_no_evaluation_sees_tuning_contexts(beyond):

@@ -15,7 +15,7 @@ from anyview.training.common.batches import (
     validation_triplets,
 )
 from anyview.video.datasets import Dataset
-from tests.training.discworld import SIZE, clip_table, disc_clips, disc_marks
+from tests.training.discworld import LENGTH, SIZE, clip_table, disc_clips, disc_marks
 
 
 def test_training_pairs_are_two_training_clips_at_one_time(discs):
@@ -69,7 +69,7 @@ def test_other_experts_are_paired_in_step_and_in_size():
     pairs = training_pairs(own, np.random.default_rng(0), 400)
     assert set(pairs.sources) == set(pairs.targets) == set(range(6))
     assert set(pairs.times) == set(range(5))
-    steps = own.steps(pairs.sources, pairs.times)
+    steps = own.steps(pairs.sources, pairs.times, pairs.targets)
     assert {*zip(pairs.times, steps, strict=True)} == {(0, 0), (1, 4), (2, 14), (3, 28), (4, 48)}
     expert, target = np.split(pairs.frames(own), 2)
     assert expert.shape == target.shape == (400, SIZE, SIZE, 3)
@@ -79,6 +79,32 @@ def test_other_experts_are_paired_in_step_and_in_size():
         assert np.abs(expert[n].mean((0, 1)) - there.mean((0, 1))).max() < 6
     held_out = validation_pairs(own, np.random.default_rng(0), 20)
     assert set(held_out.sources) == set(held_out.targets) == {6, 7}
+
+
+def test_clips_of_a_tempo_of_their_own_are_paired_by_progress():
+    """j: the frame that is as far as i's, to half of what passes from one frame to the next."""
+    paces = np.linspace(0.6, 1.8, 8)[:, None]
+    progress = 49 * np.linspace(0, 1, LENGTH) ** paces
+    table = clip_table(["train"] * 6 + ["validation"] * 2)
+    text = [" ".join(f"{far:.2f}" for far in clip) for clip in progress]
+    dataset = Dataset("tempo", disc_clips(8), table.assign(progress=text), disc_marks(8))
+    pairs = training_pairs(dataset, np.random.default_rng(0), 300)
+    steps = dataset.steps(pairs.sources, pairs.times, pairs.targets)
+    apart = np.abs(progress[pairs.sources, pairs.times] - progress[pairs.targets, steps])
+    assert (apart <= np.diff(progress).max() / 2 + 0.01).all()
+    assert (steps != pairs.times).mean() > 0.3
+    expert, target = np.split(pairs.frames(dataset), 2)
+    assert np.array_equal(expert, dataset.frames[pairs.sources, pairs.times])
+    assert np.array_equal(target, dataset.frames[pairs.targets, steps])
+    _, marks = np.split(pairs.marks(dataset)[0], 2)
+    assert np.array_equal(marks, dataset.marks[pairs.targets, steps])
+    # A whole clip in step with another.
+    shown = dataset.expert_clip(0, 7)
+    nearest = [np.abs(progress[0] - far).argmin() for far in progress[7]]
+    assert np.array_equal(shown, dataset.frames[0, nearest])
+    # Several times of each pair.
+    of_pairs = dataset.steps(pairs.sources[:4, None], np.arange(LENGTH)[None], pairs.targets[:4, None])
+    assert np.array_equal(of_pairs[2, pairs.times[2]], steps[2])
 
 
 def test_marks_of_other_experts_are_brought_to_the_size_and_step_of_the_own():
@@ -93,7 +119,7 @@ def test_marks_of_other_experts_are_brought_to_the_size_and_step_of_the_own():
     unit = SIZE / 24
     expected = unit * (marks[pairs.sources, pairs.times] + 0.5) - 0.5
     np.testing.assert_allclose(expert, expected, rtol=1e-5)
-    steps = dataset.steps(pairs.sources, pairs.times)
+    steps = dataset.steps(pairs.sources, pairs.times, pairs.targets)
     np.testing.assert_array_equal(target, true[pairs.targets, steps])
     np.testing.assert_array_equal(context, true[pairs.targets, 0])
     unmarked = Dataset("diverse", own, table, true, experts=Dataset("real", rig.frames, table))

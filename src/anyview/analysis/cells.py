@@ -19,6 +19,8 @@ LABELS = {
     "choice-framewise": "no task embedding",
     "choice-oracle": "Oracle (true view)",
     "choice-clock": "clock alone",
+    "choice-tempo": "any tempo",
+    "choice-tempo-by-step": "any tempo, by step",
     "clock": "Clock alone",
     "angles": "Ours (one clip)",
     "choice-angles": "Choice (one clip)",

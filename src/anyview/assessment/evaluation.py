@@ -53,7 +53,7 @@ def evaluate_clip(model: Translator, dataset: Dataset, source: int, target: int)
     the last frame alone (figure 18).
     """
     device = next(model.parameters()).device
-    clips = dataset.expert_clip(source), dataset.frames[target]
+    clips = dataset.expert_clip(source, target), dataset.frames[target]
     expert, true = (to_input(clip).to(device) for clip in clips)
     z2, skips = model.encode_context(true[:1])
     z_true = model.encode_expert(true)

@@ -42,7 +42,7 @@ def _rises(model: Translator, dataset: Dataset, pair: tuple[int, int], offsets: 
     """Mean rise of L_tr (T,) when each frame is replaced by the ones ``offsets`` later, around the end."""
     device = next(model.parameters()).device
     source, target = pair
-    clips = dataset.expert_clip(source), dataset.frames[target]
+    clips = dataset.expert_clip(source, target), dataset.frames[target]
     expert, true = (to_input(clip).to(device) for clip in clips)
     z1 = model.encode_expert(expert)
     task = embed_task(model, z1)  # of the clip as it is: a frame is replaced where T reads its time step

@@ -18,6 +18,11 @@ class DemonstrationSet(Block):
         "`choice`: as diverse, with a red goal and a green one, of which a demonstration goes to either"
     )
     demos: Count = Field(description="demonstrations to render")
+    tempo: Literal["script", "varied"] = Field(
+        default="script",
+        description="`script`: frame t means the same progress in all of them; `varied`: each approaches and "
+        "pushes at a tempo of its own, as its manifest tells",
+    )
 
 
 class Simulate(Block):

@@ -140,6 +140,20 @@ class DemonstrationCell(MethodCell):
         default=Incomplete(),
         description="which frames there are: every n-th (`every`), up to a part of the clip (`until`)",
     )
+    matching: Literal["steps", "transport"] = Field(
+        default="steps",
+        description="`steps`: frame t is compared with frame t of the demonstrations' mean; `transport`: an "
+        "episode's frames with those of each demonstration by optimal transport, whatever their tempo",
+    )
+
+    @model_validator(mode="after")
+    def _transported(self) -> "DemonstrationCell":
+        if self.matching == "transport":
+            if self.reward != "translated":
+                raise ValueError("matching: transport is for translated demonstrations")
+            if self.time_power or self.incomplete != Incomplete():
+                raise ValueError("matching: transport knows no steps: time_power 0, and no incomplete clips")
+        return self
 
 
 class EmbeddingRewardCell(MethodCell):

@@ -1,6 +1,7 @@
 """The expert's path: from pose to pose, at the same steps in every demonstration of a task.
 
-Clips are paired by time step, so that frame t means the same progress in each of them.
+Clips are paired by time step, so that frame t means the same progress in each of them; unless they keep a
+tempo of their own (see ``tempo``).
 """
 
 from collections.abc import Sequence

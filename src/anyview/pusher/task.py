@@ -55,6 +55,8 @@ class Task(ABC):
     """MJCF geoms in the frame of the last link: see ``scene.fingers``."""
     objects: tuple[str, ...]
     """MJCF bodies: see ``scene.sliding_body``."""
+    phases: tuple[int, ...] = ()
+    """Steps at which phases of the expert's script end, its tool at rest; what a varied tempo stretches."""
 
     def model(self, control: str) -> mujoco.MjModel:
         """The compiled world for ``control`` "twist" or "torque". Shared: do not modify it, copy it."""

@@ -15,10 +15,12 @@ from anyview.rewards.demonstration import (
     hold,
     translate_clock,
     translate_demonstrations,
+    translate_each,
     true_demonstrations,
 )
 from anyview.rewards.embedding import EmbeddingReward
 from anyview.rewards.goal import GoalReward
+from anyview.rewards.transport import TransportReward
 from anyview.runtime.device import torch_device
 from anyview.runtime.errors import AnyviewError
 from anyview.translator.architectures import Translator
@@ -41,6 +43,10 @@ def _demonstrated(group: Group, cell: DemonstrationCell) -> Scoring:
     """The translated demonstration's reward, or the Oracle's against the true one."""
     model = _fitting(load_translator(paths.model(cell.model)), cell.model, group.params.sim.image_size)
     first = np.ascontiguousarray(group.own[:, 0])
+    if cell.matching == "transport":
+        each = translate_each(model, group.demonstrations, first)
+        transport = TransportReward(model, *each, first, cell.weights)
+        return Scoring(transport, transport.scales, transport.targets(), fixed=True)
     there = frames_there(group.own.shape[1], cell.incomplete)
     if cell.reward == "true":
         targets = true_demonstrations(model, group.own)

@@ -130,17 +130,40 @@ def translate_clock(model: Translator, clips: np.ndarray, first_frames: np.ndarr
     return _translate(model, [mean], first_frames, device)
 
 
+@torch.inference_mode()
+def translate_each(
+    model: Translator, demonstrations: np.ndarray, first_frames: np.ndarray
+) -> tuple[Tensor, Tensor]:
+    """As ``translate_demonstrations``, of every clip: features (R, m, T, F) and frames (R, m, T, 3, H, W)."""
+    device = next(model.parameters()).device
+    shared = demonstrations.ndim == 5
+    encoded = [
+        [_in_parts(model.encode_expert, clip[1:], device) for clip in clips]
+        for clips in ([demonstrations] if shared else demonstrations)
+    ]
+    agents = zip(encoded * len(first_frames) if shared else encoded, first_frames, strict=True)
+    pairs = [_translations(model, clips, frame, device) for clips, frame in agents]
+    features, images = zip(*pairs, strict=True)
+    return torch.stack(features), torch.stack(images)
+
+
 def _translate(
     model: Translator, clips: Sequence[Tensor], first_frames: np.ndarray, device: torch.device
 ) -> tuple[Tensor, Tensor]:
     """The means over ``clips``, each z1 (T, Z), of their translated features and frames."""
-    features, images = [], []
-    for frame in first_frames:
-        z2, skips = model.encode_context(to_input(torch.from_numpy(frame[None]).to(device)))
-        translated = [model.translate(z1, z2, embed_task(model, z1)) for z1 in clips]
-        features.append(torch.stack([model.features(z3) for z3 in translated]).mean(0))
-        images.append(torch.stack([model.decode(z3, skips) for z3 in translated]).mean(0))
+    pairs = [[each.mean(0) for each in _translations(model, clips, frame, device)] for frame in first_frames]
+    features, images = zip(*pairs, strict=True)
     return torch.stack(features), torch.stack(images)
+
+
+def _translations(
+    model: Translator, clips: Sequence[Tensor], first_frame: np.ndarray, device: torch.device
+) -> tuple[Tensor, Tensor]:
+    """Features (m, T, F) and frames (m, T, 3, H, W) of ``clips`` for the agent's ``first_frame``."""
+    z2, skips = model.encode_context(to_input(torch.from_numpy(first_frame[None]).to(device)))
+    translated = [model.translate(z1, z2, embed_task(model, z1)) for z1 in clips]
+    features = torch.stack([model.features(z3) for z3 in translated])
+    return features, torch.stack([model.decode(z3, skips) for z3 in translated])
 
 
 @torch.inference_mode()

@@ -62,6 +62,7 @@ class Push(Task):
     goal_radius = GOAL_RADIUS
     tolerance = TOLERANCE
     tool = fingers(CUP)
+    phases = (APPROACH_END, PUSH_END)
     objects = (
         sliding_body(
             "object",

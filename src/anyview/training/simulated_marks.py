@@ -42,7 +42,8 @@ def simulated_marks(dataset: Dataset) -> np.ndarray:
     for first in range(0, len(contexts), _AT_ONCE):
         some = contexts[first : first + _AT_ONCE]
         azimuths = np.array([context.azimuth for context in some])
-        seen = project(_points(some), azimuths[:, None, None])
+        own = None if dataset.progress is None else dataset.progress[first : first + _AT_ONCE]
+        seen = project(_points(some, own), azimuths[:, None, None])
         for joint in (3, 4):
             seen[..., joint, :] = where_leaving(seen[..., joint - 1, :], seen[..., joint, :])
         marks[first : first + _AT_ONCE] = seen
@@ -63,9 +64,9 @@ def project(points: np.ndarray, azimuths: np.ndarray) -> np.ndarray:
     return np.stack([right, -up], -1) / (np.tan(np.deg2rad(CAMERA_FOVY) / 2) * depth)[..., None]
 
 
-def _points(contexts: list[Context]) -> np.ndarray:
+def _points(contexts: list[Context], progress: np.ndarray | None) -> np.ndarray:
     """The marked points (N, 50, M, 3) along the expert's way, in metres."""
-    positions, _ = roll_out(contexts)
+    positions, _ = roll_out(contexts, progress)
     links = LINK * unit_vector(np.cumsum(positions[..., :3], axis=-1))
     elbow, wrist, tool = np.moveaxis(np.cumsum(links, axis=-2), -2, 0)
     objects = positions[..., 3:].reshape(*tool.shape[:2], -1, 2)

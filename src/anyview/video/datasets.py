@@ -71,17 +71,31 @@ class Dataset:
             return self.frames[clips, times]
         return resize(self.experts.frames[clips, times], self.image_size)
 
-    def steps(self, clips: np.ndarray, times: np.ndarray) -> np.ndarray:
-        """Where the set's own clips are as far as the experts' ``clips`` at ``times``: frames' indices."""
-        return times if self.experts is None else steps_at(self.experts.seconds[clips, times])
+    def steps(self, clips: np.ndarray, times: np.ndarray, others: np.ndarray) -> np.ndarray:
+        """Which frames of ``others``, the set's own, are as far as the experts' ``clips`` at ``times``."""
+        if self.experts is not None:
+            return steps_at(self.experts.seconds[clips, times])
+        if self.progress is None:
+            return times
+        return np.abs(self.progress[others] - self.progress[clips, times][..., None]).argmin(axis=-1)
 
-    def expert_clip(self, clip: int) -> np.ndarray:
-        """The experts' ``clip``, uint8 (T, H, W, 3), in step with the set's own clips and of their size."""
-        return self.frames[clip] if self.experts is None else self.experts.in_step(clip, self.image_size)
+    def expert_clip(self, clip: int, other: int) -> np.ndarray:
+        """The experts' ``clip``, uint8 (T, H, W, 3), in step with the own clip ``other`` and of its size."""
+        if self.experts is not None:
+            return self.experts.in_step(clip, self.image_size)
+        times = np.arange(self.length)
+        return self.frames[clip, self.steps(np.array(other), times, np.array(clip))]
 
     def in_step(self, clip: int, size: int) -> np.ndarray:
         """A ``clip`` of the rig in step with simulated ones, uint8 RGB (50, size, size, 3)."""
         return resize(self.frames[clip, frames_in_step(self.seconds[clip])], size)
+
+    @cached_property
+    def progress(self) -> np.ndarray | None:
+        """How far the script has come at each frame, in its steps (N, T), if clips do not keep its time."""
+        if "progress" not in self.clips:
+            return None
+        return np.array([text.split() for text in self.clips["progress"]], float)
 
     @cached_property
     def seconds(self) -> np.ndarray:

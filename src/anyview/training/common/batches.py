@@ -13,7 +13,8 @@ from anyview.video.datasets import Dataset, clip_pairs
 class FramePairs:
     """Frames ``times`` of clips ``sources`` (i) and ``targets`` (j): N pairs, of one frame each or of K.
 
-    Where i are of another set than j, ``times`` are i's, and the data set tells which of j's are as far.
+    ``times`` are i's. Where j's are others, since i are of another set or clips differ in tempo, the data set
+    tells which of j's frames are as far.
     ``sources`` and ``targets`` are (N,) and ``times`` is (N,), or all three are (N, 1), (N, 1) and (N, K).
     """
 
@@ -33,7 +34,7 @@ class FramePairs:
 
     def frames(self, dataset: Dataset) -> np.ndarray:
         """o_t^i and after them o_t^j, uint8 (2N, H, W, 3) or (2N, K, H, W, 3)."""
-        steps = dataset.steps(self.sources, self.times)
+        steps = dataset.steps(self.sources, self.times, self.targets)
         shown = dataset.expert_frames(self.sources, self.times)
         return np.concatenate((shown, dataset.frames[self.targets, steps]))
 
@@ -48,7 +49,8 @@ class FramePairs:
         """
         if dataset.marks is None:
             return None
-        of_targets = dataset.marks[self.targets, dataset.steps(self.sources, self.times)]
+        steps = dataset.steps(self.sources, self.times, self.targets)
+        of_targets = dataset.marks[self.targets, steps]
         experts = dataset.experts or dataset
         if experts.marks is None:
             of_experts = np.full_like(of_targets, np.nan)
