@@ -7,20 +7,13 @@ pipeline looks for them. It is the surrogate's rig, with another seed. Try with 
 own would give.
 """
 
-import shutil
 import sys
 import tempfile
 from pathlib import Path
 
-import pandas as pd
-
 from anyview.config import load_params
 from anyview.runtime.errors import AnyviewError, exit_code
-from anyview.runtime.outputs import whole_folder, write_atomically
-from anyview.runtime.progress import track
-from anyview.runtime.workers import run_tasks
-from anyview.surrogate.film import film, plan
-from anyview.video.manifests import times_file
+from anyview.surrogate.film import film_set, plan
 
 SEED = 7_000_000  # added to `base.seed`
 
@@ -32,18 +25,9 @@ def main(arguments: list[str]) -> None:
     if folder.exists():
         raise AnyviewError(f"{folder}: is there already; name another folder")
     params = load_params()
-    seed, width = params.base.seed + SEED, params.real.film.width
-    rows: list[dict[str, str]] = []
-    with tempfile.TemporaryDirectory() as scratch, whole_folder(folder) as output:
-        tasks = [(Path(scratch), shot, width, seed) for shot in plan(int(arguments[0]), 0, 0)]
-        with track("film", len(tasks)) as progress:
-            for filmed in run_tasks(film, tasks):
-                rows += filmed
-                progress.advance()
-        for row in rows:
-            for name in (row["file"], times_file(row["file"])):
-                shutil.copyfile(Path(scratch) / name, output / name)
-        write_atomically(output / "manifest.csv", pd.DataFrame(rows).to_csv(index=False))
+    with tempfile.TemporaryDirectory() as scratch:
+        demonstrations = plan(int(arguments[0]), 0, 0)
+        film_set(folder, demonstrations, params.real.film.width, params.base.seed + SEED, Path(scratch))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,8 @@
 """What the rig films: which demonstrations, of which kind, seen by which two webcams."""
 
 import math
+import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,6 +10,9 @@ import numpy as np
 import pandas as pd
 
 from anyview.runtime.once import once
+from anyview.runtime.outputs import whole_folder, write_atomically
+from anyview.runtime.progress import track
+from anyview.runtime.workers import run_tasks
 from anyview.seeds import stream
 from anyview.surrogate.push import sample_push
 from anyview.surrogate.scene import OTHER_TARGET_COLOURS, TARGET_COLOUR, Scene, View
@@ -44,6 +49,23 @@ def plan(pairs: int, singles: int, extreme_pairs: int) -> list[Demonstration]:
         Demonstration(f"{name}-{index:03d}", index, kind, cameras)
         for index, (name, kind, cameras) in enumerate(shots)
     ]
+
+
+def film_set(
+    folder: Path, demonstrations: Sequence[Demonstration], width: int, seed: int, scratch: Path
+) -> None:
+    """Film ``demonstrations`` into ``folder``, with their manifest; continues from ``scratch``."""
+    tasks = [(scratch, demonstration, width, seed) for demonstration in demonstrations]
+    rows: list[dict[str, str]] = []
+    with track("film", len(tasks)) as progress:
+        for filmed in run_tasks(film, tasks):
+            rows += filmed
+            progress.advance()
+    with whole_folder(folder) as output:
+        for row in rows:
+            for name in (row["file"], times_file(row["file"])):
+                shutil.copyfile(scratch / name, output / name)
+        write_atomically(output / "manifest.csv", pd.DataFrame(rows).to_csv(index=False))
 
 
 def film(folder: Path, demonstration: Demonstration, width: int, seed: int) -> list[dict[str, str]]:
