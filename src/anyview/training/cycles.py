@@ -1,7 +1,6 @@
 """What XIRL's embedding is trained for: frames of several clips, half of them of another body."""
 
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from anyview.embedding.network import Embedding
 from anyview.embedding.weights import save_embedding
 from anyview.runtime.device import products_in
 from anyview.seeds import stream, torch_seed
+from anyview.training.common.batches import even_parts
 from anyview.video.datasets import Dataset, clip_pairs
 from anyview.video.phases import frames_in_step
 from anyview.video.pixels import to_input
@@ -37,9 +37,8 @@ class ClipFrames:
 
     def parts(self, count: int) -> list["ClipFrames"]:
         """As ``FramePairs.parts``."""
-        bounds = np.linspace(0, len(self), min(count, len(self)) + 1).round().astype(int)
         arrays = self.experts, self.own, self.expert_times, self.own_times
-        return [ClipFrames(*(array[a:b] for array in arrays)) for a, b in pairwise(bounds)]
+        return [ClipFrames(*(array[part] for array in arrays)) for part in even_parts(len(self), count)]
 
     def frames(self, dataset: Dataset) -> np.ndarray:
         """The experts' frames and after them the own, uint8 (2N, K, H, W, 3)."""

@@ -26,10 +26,10 @@ class FramePairs:
         return len(self.times)
 
     def parts(self, count: int) -> list["FramePairs"]:
-        """The pairs in ``count`` runs of about equal length, fewer if there are fewer pairs."""
-        bounds = np.linspace(0, len(self), min(count, len(self)) + 1).round().astype(int)
+        """The pairs in ``even_parts``."""
         return [
-            FramePairs(self.sources[a:b], self.targets[a:b], self.times[a:b]) for a, b in pairwise(bounds)
+            FramePairs(self.sources[part], self.targets[part], self.times[part])
+            for part in even_parts(len(self), count)
         ]
 
     def frames(self, dataset: Dataset) -> np.ndarray:
@@ -63,6 +63,12 @@ class FramePairs:
     def contexts(self, dataset: Dataset) -> np.ndarray:
         """o_0^j, uint8 (N, H, W, 3); of pairs of one frame each."""
         return dataset.frames[self.targets, 0]
+
+
+def even_parts(length: int, count: int) -> list[slice]:
+    """``count`` runs of about equal length that make up ``length``, no run empty: fewer if it is less."""
+    bounds = np.linspace(0, length, min(count, length) + 1).round().astype(int)
+    return [slice(a, b) for a, b in pairwise(bounds)]
 
 
 def training_pairs(dataset: Dataset, rng: np.random.Generator, count: int) -> FramePairs:
