@@ -22,7 +22,7 @@ import torch
 from anyview.config import GoalCell, Params, load_params
 from anyview.embedding.network import Embedding
 from anyview.evaluation.methods import Group, Method, Scoring, first_demonstration
-from anyview.evaluation.runs import evaluate_group
+from anyview.evaluation.runs import Work, evaluate_group
 from anyview.learners import ddpg
 from anyview.pusher.contexts import Context, sample_contexts
 from anyview.pusher.expert import roll_out
@@ -115,9 +115,8 @@ def main() -> None:
 
         method = Method(ddpg.make_learner, make_reward)
         scratch = checkpoint_folder(["xirl_shared_view", name, updates, one_goal])
-        runs = evaluate_group(
-            "human-xirl", params, method, range(RUNS), contexts, own[:1], Path(scratch)
-        ).runs
+        work = Work("human-xirl", params, method, range(RUNS), contexts, own[:1])
+        runs = evaluate_group(work, Path(scratch)).runs
         ends = 100 * runs["final_distance"]
         done = f"{runs['success'].sum()} of {RUNS} succeed, median {ends.median():.1f} cm"
         print(f"{name}: {done}; {' '.join(f'{end:.1f}' for end in ends)}", flush=True)

@@ -11,7 +11,7 @@ from anyview import paths
 from anyview.adversarial import gail, tpil
 from anyview.config import AdversarialCell, Params, load_params
 from anyview.evaluation.methods import MakeLearner, MakeReward, Method
-from anyview.evaluation.runs import groups_of
+from anyview.evaluation.runs import Work, groups_of
 from anyview.evaluation.stage import draw_contexts, origin, settings
 from anyview.learners import ddpg, trpo
 from anyview.ranking.rollouts import scripted_rollouts
@@ -44,7 +44,7 @@ def group_tasks(name: str, params: Params) -> list[tuple[Any, ...]]:
             runs = [number * params.imitation.runs + run for run in group]
             own = {kind: positions[list(group)] for kind, positions in scripted.items()}
             scratch = checkpoint_folder(["rank", *values, len(tasks)], files)
-            tasks.append((name, params, method, runs, *setting.of(group), own, scratch))
+            tasks.append((Work(name, params, method, runs, *setting.of(group)), own, scratch))
     return tasks
 
 
@@ -72,7 +72,7 @@ def main(arguments: list[str]) -> None:
         for score in run_tasks(score_group, tasks):
             scores.append(score)
             progress.advance()
-    names = [task[0] for task in tasks]
+    names = [work.cell for work, *_ in tasks]
     with whole_folder(paths.RANKINGS) as output:
         for file, tables in zip(("rollouts.csv", "values.csv"), zip(*scores, strict=True), strict=True):
             write_table(output / file, names, tables, params.imitation.runs)

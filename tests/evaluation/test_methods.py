@@ -14,7 +14,7 @@ from anyview.embedding.network import Embedding
 from anyview.embedding.weights import load_embedding, save_embedding
 from anyview.evaluation.demonstrations import imitated_demonstrations, training_clips
 from anyview.evaluation.methods import Method
-from anyview.evaluation.runs import evaluate_group
+from anyview.evaluation.runs import Work, evaluate_group
 from anyview.learners import ddpg, trpo
 from anyview.pusher.batch import PusherBatch
 from anyview.pusher.contexts import Context, sample_contexts
@@ -116,7 +116,8 @@ def test_the_evaluation_runs_each_baseline(study: Params, tmp_path: Path, cell: 
     contexts, _ = sample_contexts(stream(1, "test"), 2)
     clips, demonstrations = imitated_demonstrations(study)
     assert clips == ["c0"]
-    result = evaluate_group(cell, study, METHODS[cell], range(2), contexts, demonstrations, tmp_path)
+    work = Work(cell, study, METHODS[cell], range(2), contexts, demonstrations)
+    result = evaluate_group(work, tmp_path)
     assert np.isfinite(result.curve.to_numpy()).all()
     assert len(result.curve) == 2 * 4
     assert result.rollouts.shape == (2, 50, 32, 64, 3)

@@ -14,7 +14,7 @@ from ruamel.yaml import YAML
 
 from anyview.config import load_params
 from anyview.evaluation.methods import Method
-from anyview.evaluation.runs import evaluate_group, groups_of
+from anyview.evaluation.runs import Work, evaluate_group, groups_of
 from anyview.learners import ddpg
 from anyview.learners.common.policies import load_policy
 from anyview.pusher.batch import PusherBatch
@@ -138,15 +138,18 @@ def test_watch_plays_a_policy(study: Path, root: Path) -> None:
     assert "theirs: no such method was evaluated; there are " in ran.stderr
 
 
+@pytest.mark.parametrize("matching", ["steps", "transport"])
 def test_an_interrupted_group_ends_with_the_same_results(
-    study: Path, tmp_path: Path, expert_clips, monkeypatch
+    study: Path, tmp_path: Path, expert_clips, monkeypatch, matching: str
 ) -> None:
     """Stop after an iteration has been kept; the second call continues, and ends where a whole one does."""
     monkeypatch.chdir(study)
     params = load_params()
+    cells = {"ours": params.imitation.cells["ours"].model_copy(update={"matching": matching})}
+    params = params.model_copy(update={"imitation": params.imitation.model_copy(update={"cells": cells})})
     contexts, _ = sample_contexts(stream(0, "test"), 2)
-    work = ("ours", params, OURS, [0, 1], contexts, expert_clips[:2])
-    whole = evaluate_group(*work, tmp_path / "whole")
+    work = Work("ours", params, OURS, [0, 1], contexts, expert_clips[:2])
+    whole = evaluate_group(work, tmp_path / "whole")
 
     class Stop(Exception):
         pass
@@ -163,9 +166,9 @@ def test_an_interrupted_group_ends_with_the_same_results(
     monkeypatch.setattr(Checkpoints, "due", lambda self: True)
     monkeypatch.setattr(Checkpoints, "save", save_then_stop)
     with pytest.raises(Stop):
-        evaluate_group(*work, tmp_path / "parts")
+        evaluate_group(work, tmp_path / "parts")
     monkeypatch.setattr(Checkpoints, "save", save)
-    resumed = evaluate_group(*work, tmp_path / "parts")
+    resumed = evaluate_group(work, tmp_path / "parts")
     pd.testing.assert_frame_equal(resumed.runs, whole.runs, check_exact=True)
     pd.testing.assert_frame_equal(resumed.curve, whole.curve, check_exact=True)
     np.testing.assert_array_equal(resumed.rollouts, whole.rollouts)
@@ -178,10 +181,9 @@ def test_a_run_in_lockstep_is_the_same_run_alone(study: Path, tmp_path: Path, ex
     monkeypatch.chdir(study)
     params = load_params()
     contexts, _ = sample_contexts(stream(0, "test"), 3)
-    together = evaluate_group(
-        "ours", params, OURS, [0, 1, 2], contexts, expert_clips[:2], tmp_path / "together"
-    )
-    alone = evaluate_group("ours", params, OURS, [1], contexts[1:2], expert_clips[:2], tmp_path / "alone")
+    every = Work("ours", params, OURS, [0, 1, 2], contexts, expert_clips[:2])
+    together = evaluate_group(every, tmp_path / "together")
+    alone = evaluate_group(every._replace(runs=[1], contexts=contexts[1:2]), tmp_path / "alone")
     same = together.runs[together.runs["run"] == 1].reset_index(drop=True)
     pd.testing.assert_frame_equal(alone.runs, same, rtol=1e-4)
     for name, weights in alone.policies.items():

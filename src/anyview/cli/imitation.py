@@ -11,7 +11,7 @@ from anyview import paths
 from anyview.cli.footage import find_clip, read_clip
 from anyview.config import DemonstrationCell, LossWeights, Params, RewardWeights, load_params
 from anyview.evaluation.methods import Method
-from anyview.evaluation.runs import evaluate_group
+from anyview.evaluation.runs import Work, evaluate_group
 from anyview.evaluation.stage import RATE, draw_contexts
 from anyview.learners import ddpg
 from anyview.learners.common.policies import save_policies
@@ -123,7 +123,7 @@ def train(task: Task, output: Path) -> Outcome:
         [file for file in task.model.iterdir() if file.is_file()],
     )
     method = Method(ddpg.make_learner, make_reward)
-    result = evaluate_group(_NAME, params, method, [0], [context], task.clip[None], scratch)
+    result = evaluate_group(Work(_NAME, params, method, [0], [context], task.clip[None]), scratch)
     agent, translated = np.split(result.rollouts[0], 2, axis=2)
     views = np.concatenate([task.clip, translated, agent], axis=2)
     scale = -(-_WIDTH // task.clip.shape[2])

@@ -39,6 +39,19 @@ class Result:
     rollouts: np.ndarray
 
 
+class Work(NamedTuple):
+    """A group of runs to train and evaluate, or whose reward is to score: what a worker is given."""
+
+    cell: str
+    params: Params
+    method: Method
+    runs: Sequence[int]
+    contexts: Sequence[Context]
+    """One of each run."""
+    demonstrations: np.ndarray
+    """The expert's clips in other contexts: see ``Group.demonstrations``."""
+
+
 class Prepared(NamedTuple):
     """A group of runs before its training, and where its experts went: ``positions`` (R, 50, 3 + 2 k)."""
 
@@ -58,28 +71,17 @@ def groups_of(runs: int, size: int) -> list[range]:
     return [range(start, min(start + size, runs)) for start in range(0, runs, size)]
 
 
-def evaluate_group(
-    name: str,
-    params: Params,
-    method: Method,
-    runs: Sequence[int],
-    contexts: Sequence[Context],
-    demonstrations: np.ndarray,
-    scratch: Path,
-) -> Result:
-    """Train and evaluate the ``runs`` of cell ``name``, one context each; continues from ``scratch``.
-
-    ``demonstrations`` (m, 50, H, W, 3) uint8 RGB are the expert's clips in other contexts, those of each run
-    where they are (R, m, 50, H, W, 3).
-    """
+def evaluate_group(work: Work, scratch: Path) -> Result:
+    """Train and evaluate the runs; continues from ``scratch``."""
     use_threads(1)
-    prepared = prepare(name, params, method, runs, contexts, demonstrations)
-    curve = train(name, prepared, scratch)
+    prepared = prepare(work)
+    curve = train(work.cell, prepared, scratch)
     group, positions, learner, scoring = prepared
+    params, contexts = group.params, group.contexts
 
     agent, distance, other = _perform(group, learner)
     columns = {
-        "run": list(runs),
+        "run": list(group.runs),
         "success": (distance < load_task(contexts[0].task).tolerance).astype(int),
         "final_distance": distance,
         "return_policy": _returns(scoring, agent),
@@ -98,15 +100,9 @@ def evaluate_group(
     return Result(pd.DataFrame(columns), curve, learner.policy(), rollouts)
 
 
-def prepare(
-    name: str,
-    params: Params,
-    method: Method,
-    runs: Sequence[int],
-    contexts: Sequence[Context],
-    demonstrations: np.ndarray,
-) -> Prepared:
-    """The ``runs`` of cell ``name``, untrained: see ``evaluate_group``."""
+def prepare(work: Work) -> Prepared:
+    """The runs, untrained."""
+    name, params, method, runs, contexts, demonstrations = work
     positions, _ = roll_out(contexts)
     own = _film(params, contexts, positions)
     group = Group(params, params.methods[name], runs, contexts, demonstrations, own)

@@ -20,7 +20,7 @@ from anyview.evaluation.demonstrations import (
     two_goals,
 )
 from anyview.evaluation.methods import Method
-from anyview.evaluation.runs import evaluate_group, groups_of
+from anyview.evaluation.runs import Work, evaluate_group, groups_of
 from anyview.learners.common.policies import save_policies
 from anyview.pusher.contexts import COLOURS, Colour, Context, Kind, sample_contexts
 from anyview.runtime.outputs import whole_folder, write_atomically
@@ -79,14 +79,14 @@ def evaluate_method(
     every = settings(name, params, [change(context) for context in contexts] if change else contexts)
     numbers = groups_of(params.imitation.runs, params.imitation.group)
     values, files = origin(name, params, sources)
-    tasks: list[tuple[Any, ...]] = []
+    tasks: list[tuple[Work, Path]] = []
     acted: list[Context] = []
     tables = []
     for setting in every:
         for group in numbers:
             runs = [len(acted) + run for run in group]
             scratch = checkpoint_folder([*values, len(tasks)], files)
-            tasks.append((name, params, method, runs, *setting.of(group), scratch))
+            tasks.append((Work(name, params, method, runs, *setting.of(group)), scratch))
         acted += setting.contexts
         table = pd.DataFrame({"clip": setting.clips.names} | setting.named())
         if shown.own_clips:
@@ -113,7 +113,7 @@ def evaluate_method(
         (output / "rollouts").mkdir()
         for run, rollout in enumerate(np.concatenate([result.rollouts for result in results])):
             write_video(output / "rollouts" / f"run-{run:02d}.avi", rollout, RATE)
-    for *_, scratch in tasks:
+    for _, scratch in tasks:
         shutil.rmtree(scratch)
     distance = 100 * runs["final_distance"].median()
     print(f"{name}: {runs['success'].sum()} of {len(runs)} succeed; median distance {distance:.1f} cm")

@@ -6,9 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from anyview.config import Params
-from anyview.evaluation.methods import Method
-from anyview.evaluation.runs import prepare, train
+from anyview.evaluation.runs import Work, prepare, train
 from anyview.learners.common.interfaces import RewardSource
 from anyview.pusher.batch import FRAMES
 from anyview.pusher.contexts import Context
@@ -23,30 +21,24 @@ _LOOK_BACK = 3  # steps, at most, from the frame that a reward is for to another
 
 
 def score_group(
-    name: str,
-    params: Params,
-    method: Method,
-    runs: Sequence[int],
-    contexts: Sequence[Context],
-    demonstrations: np.ndarray,
-    scripted: Mapping[str, np.ndarray],
-    scratch: Path,
+    work: Work, scripted: Mapping[str, np.ndarray], scratch: Path
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Score the rollouts ``scripted`` in ``contexts``, by kind, by the reward of cell ``name``.
+    """Score the rollouts ``scripted`` in the contexts of ``work``, by kind, by the reward of its cell.
 
-    The other arguments are those of ``evaluate_group``. A reward that learns does so first, with policies, as
-    it does for its results. Returns two tables: ``run, kind, rollout, final_distance, return``; and ``run,
+    A reward that learns does so first, with policies, as it does for its results; it continues from
+    ``scratch``. Returns two tables: ``run, kind, rollout, final_distance, return``; and ``run,
     step, value`` of each run's first good rollout (see ``values``).
     """
     use_threads(1)
-    prepared = prepare(name, params, method, runs, contexts, demonstrations)
+    prepared = prepare(work)
+    runs, contexts = work.runs, work.contexts
     reward = prepared.scoring.reward
     if not prepared.scoring.fixed:
-        train(name, prepared, scratch)
+        train(work.cell, prepared, scratch)
     returns = []
     worth = np.empty(0)
     for kind, positions in scripted.items():
-        clips = _film(contexts, positions, params.sim.image_size)
+        clips = _film(contexts, positions, work.params.sim.image_size)
         if kind == GOOD:
             worth = values(reward, clips[:, 0], TIMES)
         columns = {
