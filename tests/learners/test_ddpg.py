@@ -36,6 +36,7 @@ PARAMS = config.DDPG(
     updates_per_step=1.0,
     preactivation_penalty=0.1,
     target_rate=0.1,
+    average=0,
     replay=20000,
     recent_episodes=5,
     warmup_episodes=3,
@@ -71,13 +72,14 @@ def test_a_row_is_the_same_alone_and_in_company() -> None:
     assert not np.allclose(together.policy()["weight0"][0], alone.policy()["weight0"][0], atol=1e-3)
 
 
-def test_resumes_bit_for_bit() -> None:
+@pytest.mark.parametrize("average", [0, 50])
+def test_resumes_bit_for_bit(average: int) -> None:
     runs = [0, 1]
-    whole, world = make(runs, copies=2, replay=300), Tracking(runs, 2)
+    whole, world = make(runs, copies=2, replay=300, average=average), Tracking(runs, 2)
     practise(whole, world, 5)
     state = {name: array.copy() for name, array in whole.state().items()}
     practise(whole, world, 3)
-    resumed = make(runs, copies=2, replay=300)
+    resumed = make(runs, copies=2, replay=300, average=average)
     resumed.restore(state)
     practise(resumed, world, 3)
     for name, weights in whole.policy().items():
@@ -197,6 +199,32 @@ def test_target_networks_follow_by_the_target_rate() -> None:
         assert (after[name] != before[name]).any()
         expected = 0.9 * before[f"target_{name}"] + 0.1 * after[name]
         np.testing.assert_allclose(after[f"target_{name}"], expected, atol=1e-6, rtol=1e-5)
+
+
+def test_without_noise_a_mean_of_the_latest_weights_acts(monkeypatch) -> None:
+    """It is the mean of all at first. What is explored and learned does not know of it."""
+    learner, plain, world = make([0, 1], average=7), make([0, 1]), Tracking([0, 1])
+    weights: list[torch.Tensor] = []
+    update = learner._update
+
+    def watched(batch: Transitions) -> None:
+        update(batch)
+        weights.append(learner._policy.flat.clone())
+
+    monkeypatch.setattr(learner, "_update", watched)
+    practise(learner, world, 5)
+    practise(plain, Tracking([0, 1]), 5)
+    mean = weights[0]
+    for count, each in enumerate(weights[1:], 2):
+        mean = mean + (each - mean) / min(7, count)
+    state = learner.state()
+    np.testing.assert_allclose(state["averaged"], mean, atol=1e-5, rtol=1e-4)
+    for name, array in plain.state().items():
+        np.testing.assert_array_equal(state[name], array)
+    observations = world.reset()
+    with_noise, without = (learner.act(observations, explore=each) for each in (True, False))
+    np.testing.assert_array_equal(with_noise, plain.act(observations, explore=True))
+    assert not np.allclose(without, plain.act(observations, explore=False), atol=1e-4)
 
 
 def test_exploration_shrinks_and_acting_without_it_is_repeatable() -> None:

@@ -31,6 +31,10 @@ class DDPG(Block):
         description="weight in the policy's loss of the squared inputs of its tanh; 0 leaves it out"
     )
     target_rate: Annotated[float, Field(gt=0, le=1)] = Field(description="Polyak rate of the target networks")
+    average: CountOrNone = Field(
+        description="updates, about, of which the policy that acts without noise has the mean weights; 0 for "
+        "the last ones"
+    )
     replay: Count = Field(description="transitions kept per run")
     recent_episodes: Count = Field(description="half of each batch comes from this many newest episodes")
     warmup_episodes: CountOrNone = Field(description="episodes of noise alone before updates start")

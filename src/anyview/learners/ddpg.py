@@ -10,6 +10,8 @@ under a dense reward:
 - the networks also see radial basis functions of time, so that a correction at one step leaves others be;
 - the policy's loss penalises the squares of what enters its tanh (Andrychowicz et al. 2017, appendix A): a
   saturated action has no gradient, and early, wrong critics drive actions there for good;
+- without noise a mean of the policy's latest weights acts (Polyak and Juditsky 1992), if ``average`` says so:
+  each update moves the policy by more than it is off in the end;
 - all updates of an iteration follow its episodes, and half of each batch comes from the newest episodes: the
   critic must be sharp where the policy now goes, not where it once went.
 """
@@ -131,6 +133,7 @@ class DDPG:
         self._policy = StackedMLP.initial([inputs, *params.hidden, action_size], weights, device)
         self._critic = StackedMLP.initial([inputs + action_size, *params.hidden, 1], weights, device)
         self._target_policy, self._target_critic = self._policy.copy(), self._critic.copy()
+        self._averaged = self._policy.copy() if params.average else self._policy
         self._policy_adam, self._critic_adam = Adam(self._policy), Adam(self._critic)
         self._widths = [observation_size, action_size, 1, observation_size, 1]  # of ``Transitions``
         self._replay = Replay(len(self._runs), params.replay, sum(self._widths), device)
@@ -156,7 +159,8 @@ class DDPG:
     @torch.no_grad()
     def act(self, observations: np.ndarray, explore: bool) -> np.ndarray:
         """Actions (R, C, A); with the annealed noise where ``explore``."""
-        actions = torch.tanh(self._policy(self._input(self._tensor(observations)))).cpu().numpy()
+        policy = self._policy if explore else self._averaged
+        actions = torch.tanh(policy(self._input(self._tensor(observations)))).cpu().numpy()
         if explore:
             actions = np.clip(actions + self._noise[len(self._episode)], -1, 1)
         return actions.astype(np.float32)
@@ -231,13 +235,16 @@ class DDPG:
         self._critic_adam.descend(loss.sum(), params.critic_learning_rate)
         loss = policy_loss(self._policy, self._critic, inputs, params.preactivation_penalty)
         self._policy_adam.descend(loss.sum(), params.policy_learning_rate)
+        if params.average:  # at first of all weights so far
+            steps = min(params.average, self._policy_adam.steps)
+            self._averaged.flat.lerp_(self._policy.flat, 1 / steps)
         self._target_critic.flat.lerp_(self._critic.flat, params.target_rate)
         self._target_policy.flat.lerp_(self._policy.flat, params.target_rate)
 
     def policy(self) -> Arrays:
         """``weight<i>`` (R, in, out) and ``bias<i>`` (R, out): ReLU between layers, tanh at the end."""
         arrays: Arrays = {}
-        for index, (weight, bias) in enumerate(self._policy.layers):
+        for index, (weight, bias) in enumerate(self._averaged.layers):
             arrays[f"weight{index}"] = weight.detach().cpu().numpy().copy()
             arrays[f"bias{index}"] = bias.detach()[:, 0].cpu().numpy().copy()
         return arrays
@@ -257,7 +264,8 @@ class DDPG:
         self._begin()
 
     def _tensors(self) -> dict[str, Tensor]:
-        return {
+        averaged = {"averaged": self._averaged.flat} if self._params.average else {}
+        return averaged | {
             "policy": self._policy.flat,
             "critic": self._critic.flat,
             "target_policy": self._target_policy.flat,
