@@ -61,15 +61,8 @@ class DemonstrationReward(FixedReward):
             still_images = ((first[:, None] - images) ** 2).sum((2, 3, 4))
         feature_cost = (self._weights * still_features).mean(1, keepdim=True).clamp_min(1e-6)  # (R, 1)
         image_cost = (self._weights * still_images).mean(1, keepdim=True).clamp_min(1e-6)
-        feature: float | Tensor = weights.feature
-        image: float | Tensor = weights.image
-        if weights.raw:
-            feature, image = feature * feature_cost, image * image_cost
-        norm = feature + image
-        self._feature_scale = feature / norm / feature_cost
-        self._image_scale = image / norm / image_cost
-        leading = feature_cost / feature if weights.feature else image_cost / image
-        self.scales = (leading * norm)[:, 0].cpu().numpy()
+        self._feature_scale, self._image_scale, scales = scalings(weights, feature_cost, image_cost)
+        self.scales = scales[:, 0].cpu().numpy()
 
     @torch.inference_mode()
     def step(self, frames: np.ndarray, step: int) -> np.ndarray:
@@ -87,6 +80,23 @@ class DemonstrationReward(FixedReward):
     def targets(self) -> np.ndarray:
         """The demonstration each run imitates, from o_0 on in its own view: uint8 (R, T + 1, H, W, 3)."""
         return np.concatenate([self._first[:, None], to_frames(self._images)], axis=1)
+
+
+def scalings(
+    weights: RewardWeights, feature_cost: Tensor, image_cost: Tensor
+) -> tuple[Tensor, Tensor, Tensor]:
+    """What squared distances of features and of images are multiplied by, so that standing still costs 1.
+
+    The costs are those of standing still, any shape. Third, what brings a reward back to the equations'
+    scale: see ``DemonstrationReward``.
+    """
+    feature: float | Tensor = weights.feature
+    image: float | Tensor = weights.image
+    if weights.raw:
+        feature, image = feature * feature_cost, image * image_cost
+    norm = feature + image
+    leading = feature_cost / feature if weights.feature else image_cost / image
+    return feature / norm / feature_cost, image / norm / image_cost, leading * norm
 
 
 def frames_there(length: int, incomplete: Incomplete) -> np.ndarray:

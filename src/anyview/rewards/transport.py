@@ -10,6 +10,7 @@ from torch import Tensor
 
 from anyview.config import RewardWeights
 from anyview.learners.common.interfaces import Arrays
+from anyview.rewards.demonstration import scalings
 from anyview.translator.architectures import Translator
 from anyview.video.pixels import to_frames, to_input
 
@@ -47,16 +48,9 @@ class TransportReward:
                 (one[:, None, None] - target).square().sum(-1).mean((1, 2)).clamp_min(1e-6)
                 for one, target in zip(still, self._targets, strict=True)
             ]
-        shares: list[float | Tensor] = [weights.feature, weights.image]
-        if weights.raw:
-            shares = [share * cost for share, cost in zip(shares, costs, strict=True)]
-        norm = shares[0] + shares[1]
-        self._factors = [
-            (share / norm / cost)[:, None, None, None, None]
-            for share, cost in zip(shares, costs, strict=True)
-        ]
-        leading = costs[0] / shares[0] if weights.feature else costs[1] / shares[1]
-        self.scales = (leading * norm).cpu().numpy()
+        *factors, scales = scalings(weights, *costs)
+        self._factors = [factor[:, None, None, None, None] for factor in factors]
+        self.scales = scales.cpu().numpy()
         self._seen: list[tuple[Tensor, Tensor]] = []
         self._ended: np.ndarray | None = None
         self._episodes: list[np.ndarray] = []
