@@ -47,7 +47,7 @@ def simulate_shard(
     def make() -> tuple[dict[str, Any], list[str]]:
         rng = stream(seed, f"demonstrations/{name}", index)
         contexts, acceptance = sample_contexts(rng, count, kind, task)
-        progress = draw_progress(rng, count, load_task(task)) if varied else None
+        progress = draw_progress(rng, count, task) if varied else None
         positions, distances = roll_out(contexts, progress)
         camera = renderer(task, image_size)
         clips = [camera.render_clip(*scene) for scene in zip(contexts, positions, strict=True)]

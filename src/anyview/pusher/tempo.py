@@ -6,7 +6,7 @@ A progress of p means that the clip is where the script is at its step p; it nee
 import numpy as np
 
 from anyview.pusher.path import FRAMES
-from anyview.pusher.task import Task
+from anyview.pusher.task import load_task
 from anyview.runtime.errors import AnyviewError
 
 DECIMALS = 2  # of a progress, which a manifest has as text
@@ -14,14 +14,15 @@ _STRETCH = (0.7, 1.4)  # of a phase
 _LAST_END = 48.0  # frames, at most, until the last phase ends
 
 
-def draw_progress(rng: np.random.Generator, count: int, task: Task) -> np.ndarray:
+def draw_progress(rng: np.random.Generator, count: int, task: str) -> np.ndarray:
     """The progress (count, 50) of clips, each phase of ``task`` stretched by a random factor of its own.
 
     The last phase is followed by a rest. Raises AnyviewError where the task's script has no phases.
     """
-    if not task.phases:
-        raise AnyviewError("the script of this task has no phases to stretch: its sets need tempo script")
-    script = np.array([0, *task.phases])
+    phases = load_task(task).phases
+    if not phases:
+        raise AnyviewError(f"task {task}: its script has no phases to stretch; set `tempo: script`")
+    script = np.array([0, *phases])
     ends = (np.diff(script) * rng.uniform(*_STRETCH, (count, len(script) - 1))).cumsum(axis=1)
     ends *= np.minimum(1.0, _LAST_END / ends[:, -1:])
     last = FRAMES - 1
