@@ -149,15 +149,25 @@ def test_the_committed_params_are_sound():
         (
             "beyond.cells.angles.own_clips",
             False,
-            "beyond.cells.angles: angles: chosen for each context's own camera, which needs own_clips",
+            "beyond.cells.angles.angles: chosen for each context's own camera, which needs own_clips",
         ),
-        ("beyond.cells.angles.angles", [30, 30], "beyond.cells.angles: angles: one is listed twice"),
+        (
+            "beyond.cells.choice-tempo.time_power",
+            2.0,
+            "beyond.cells.choice-tempo.time_power: must be 0 where clips are matched by transport",
+        ),
+        (
+            "beyond.cells.choice-tempo.incomplete",
+            {"every": 2},
+            "beyond.cells.choice-tempo.incomplete: clips matched by transport have all their frames",
+        ),
+        ("beyond.cells.angles.angles", [30, 30], "beyond.cells.angles.angles: one is listed twice"),
         (
             "beyond.ranking.methods",
             ["ours", "sim"],
             "beyond.ranking.methods: 'sim' is none of these: ours, liu, narrow-ddpg",
         ),
-        ("beyond.cells.clock.own_clips", True, "beyond.cells.clock: own_clips: a clock hears of no clip"),
+        ("beyond.cells.clock.own_clips", True, "beyond.cells.clock.own_clips: a clock hears of no clip"),
         (
             "beyond.cells.clips-1.incomplete",
             {"every": 30, "until": 0.5},
@@ -260,7 +270,7 @@ def test_the_committed_params_are_sound():
             ["sim", "real-pretrained"],
             "evidence: translators.real-pretrained.pretraining.iterations: no translator of the evidence ",
         ),
-        ("evidence.losses.others.seeds", [7], "evidence.losses: others.seeds: some of them are not in seeds"),
+        ("evidence.losses.others.seeds", [7], "evidence.losses.others.seeds: some of them are not in seeds"),
         ("evidence.diversity.views", [4, 1], "evidence.diversity.views: they must rise"),
         ("evidence.diversity.views", ["any", 4], "evidence.diversity.views: they must rise"),
         (
@@ -348,7 +358,8 @@ def test_further_mistakes_are_counted():
 )
 def test_any_value_is_taken_or_refused_in_one_line(path, value):
     said = refusal(lambda: parse_params(changed(path, value)))
-    assert said is None or ".".join(path) in said
+    block = path[:-1]  # of two keys that do not fit each other, the other one may be named
+    assert said is None or ".".join(block) in said
 
 
 ALIASES = "a: &a [x, x]\n" + "".join(f"{new}: &{new} [*{old}, *{old}]\n" for old, new in pairwise(LETTERS))

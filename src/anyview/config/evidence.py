@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, model_validator
 
 from anyview.config.imitation import RewardWeights
-from anyview.config.values import Block, Count, Name
+from anyview.config.values import Block, Count, KeyRefused, Name
 from anyview.paths import ANY_VIEW
 
 
@@ -46,9 +46,9 @@ class Losses(Block):
     @model_validator(mode="after")
     def _others_of_these(self) -> "Losses":
         if not set(self.others.seeds) <= set(self.seeds):
-            raise ValueError("others.seeds: some of them are not in seeds")
+            raise KeyRefused("others.seeds", "some of them are not in seeds")
         if twice := self.rewards.keys() & self.others.rewards.keys():
-            raise ValueError(f"others.rewards.{min(twice)}: the name is taken by rewards")
+            raise KeyRefused(f"others.rewards.{min(twice)}", "the name is taken by rewards")
         return self
 
     @property

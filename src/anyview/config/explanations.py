@@ -5,6 +5,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from anyview.config.values import KeyRefused
+
 
 def explain(error: ValidationError) -> str:
     """The first impossible key and why it is, with every other one counted."""
@@ -13,6 +15,9 @@ def explain(error: ValidationError) -> str:
     loc = first["loc"]
     if loc[:2] in (("imitation", "cells"), ("beyond", "cells")):
         loc = loc[:3] + loc[4:]  # without the tag of the reward's kind
+    refused = first.get("ctx", {}).get("error")
+    if isinstance(refused, KeyRefused):
+        loc = (*loc, refused.key)
     key = ".".join(str(part) for part in loc if part != "[key]") or "the file"
     if first["type"] == "extra_forbidden":
         message = "unknown key"

@@ -11,6 +11,7 @@ from anyview.config.values import (
     CountOrNone,
     Discount,
     Fraction,
+    KeyRefused,
     Name,
     NonNegative,
     Positive,
@@ -154,9 +155,11 @@ class DemonstrationCell(MethodCell):
     def _transported(self) -> "DemonstrationCell":
         if self.matching == "transport":
             if self.reward != "translated":
-                raise ValueError("matching: transport is for translated demonstrations")
-            if self.time_power or self.incomplete != Incomplete():
-                raise ValueError("matching: transport knows no steps: time_power 0, and no incomplete clips")
+                raise KeyRefused("matching", "transport is for translated demonstrations")
+            if self.time_power:
+                raise KeyRefused("time_power", "must be 0 where clips are matched by transport, not by step")
+            if self.incomplete != Incomplete():
+                raise KeyRefused("incomplete", "clips matched by transport have all their frames")
         return self
 
 
@@ -237,9 +240,9 @@ class BeyondMethodCell(WithExperts, MethodCell):
     @model_validator(mode="after")
     def _angles_of_own_clips(self) -> "BeyondMethodCell":
         if self.angles and not self.own_clips:
-            raise ValueError("angles: chosen for each context's own camera, which needs own_clips")
+            raise KeyRefused("angles", "chosen for each context's own camera, which needs own_clips")
         if len(set(self.angles)) < len(self.angles):
-            raise ValueError("angles: one is listed twice")
+            raise KeyRefused("angles", "one is listed twice")
         return self
 
 

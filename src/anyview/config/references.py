@@ -73,7 +73,7 @@ def _refuse_clips_that_nobody_sees(params: Params, name: str) -> None:
     for key, cell in params.beyond.cells.items():
         clock = cell.reward == "clock"
         if clock and cell.own_clips:
-            raise AnyviewError(f"{name}: beyond.cells.{key}: own_clips: a clock hears of no clip")
+            raise AnyviewError(f"{name}: beyond.cells.{key}.own_clips: a clock hears of no clip")
         if cell.other_experts and (clock or cell.own_clips):
             raise AnyviewError(
                 f"{name}: beyond.cells.{key}.experts: other experts' clips are the same for every context, "

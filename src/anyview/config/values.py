@@ -28,6 +28,14 @@ Name = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9_-]{0,63}$")] 
 TaskName = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,63}$")]  # of a module
 
 
+class KeyRefused(ValueError):
+    """One of a block's keys does not fit the others: its dotted name within the block, and why."""
+
+    def __init__(self, key: str, why: str) -> None:
+        super().__init__(why)
+        self.key = key
+
+
 class Block(BaseModel):
     """A block of params: no unknown keys, no silent conversions, no infinities."""
 
