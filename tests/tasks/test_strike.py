@@ -99,5 +99,10 @@ def test_expert_succeeds_in_unseen_contexts_on_one_time_profile() -> None:
     tool = np.linalg.norm(np.diff(tool_pose(positions[..., :3])[..., :2], axis=1), axis=-1)
     assert ball[:, :13].max() < 1e-6  # nobody touches the ball before the stroke
     assert (ball[:, 19:30].min(axis=1) > 0.004).all()  # every ball rolls at the same steps
+    to_go = np.linalg.norm(positions[..., 3:] - goals(contexts)[:, None], axis=-1)
+    moments = positions.reshape(-1, 1, 5)
+    gaps = clearance(MALLET, BALL_RADIUS, tool_pose(moments[..., :3]), moments[..., 3:])
+    let_go = np.where(gaps.reshape(to_go.shape) < 0.005, to_go, np.inf).min(axis=1)
+    assert (let_go > TASK.tolerance + RELEASE + 0.04).all()  # two pixels before it has to
     assert tool[:, 24:].max() < 1e-3  # while the arm rests
     assert ball[:, -1].max() < 1e-3  # and rests at the end, too
