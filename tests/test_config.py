@@ -56,6 +56,15 @@ def test_the_committed_params_are_sound():
     assert params.imitation.cells.keys() == VALUES["imitation"]["cells"].keys()
 
 
+def test_a_method_and_its_oracle_differ_by_the_reward_alone():
+    params = load_params(PARAMS)
+    beyond, cells = params.beyond.cells, params.imitation.cells
+    pairs = [(beyond[name], beyond[f"{name}-oracle"]) for name in beyond if f"{name}-oracle" in beyond]
+    assert len(pairs) == 4
+    for method, oracle in [*pairs, (cells["ours"], cells["oracle"])]:
+        assert oracle == method.model_copy(update={"reward": "true"})
+
+
 @pytest.mark.parametrize(
     ("path", "value", "said"),
     [
