@@ -48,10 +48,14 @@ def group_tasks(name: str, params: Params) -> list[tuple[Any, ...]]:
     return tasks
 
 
-def write_table(path: Path, names: Sequence[str], tables: Sequence[pd.DataFrame], contexts: int) -> None:
+def write_table(path: Path, works: Sequence[Work], tables: Sequence[pd.DataFrame]) -> None:
     """Write the tables of all groups as one, with each row's method and context."""
-    table = pd.concat([table.assign(cell=name) for name, table in zip(names, tables, strict=True)])
-    table["context"] = table["run"] % contexts
+    table = pd.concat(
+        [
+            table.assign(cell=work.cell, context=table["run"] % work.params.imitation.runs)
+            for work, table in zip(works, tables, strict=True)
+        ]
+    )
     first = ["cell", "context"]
     table = table[first + [column for column in table if column not in first]]
     write_atomically(path, table.to_csv(index=False, float_format="%.6g"))
@@ -72,10 +76,10 @@ def main(arguments: list[str]) -> None:
         for score in run_tasks(score_group, tasks):
             scores.append(score)
             progress.advance()
-    names = [work.cell for work, *_ in tasks]
+    works = [work for work, *_ in tasks]
     with whole_folder(paths.RANKINGS) as output:
         for file, tables in zip(("rollouts.csv", "values.csv"), zip(*scores, strict=True), strict=True):
-            write_table(output / file, names, tables, params.imitation.runs)
+            write_table(output / file, works, tables)
     for *_, scratch in tasks:
         shutil.rmtree(scratch)
 

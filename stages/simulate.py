@@ -67,7 +67,7 @@ def simulate_shard(
         ]
         return {"file": vars(stored), "rows": rows, "acceptance": acceptance}, [stored.file]
 
-    return once(folder, f"shard-{index:04d}", make)
+    return once(folder, f"shard-{index:04d}-{count}", make)
 
 
 def main(arguments: list[str]) -> None:

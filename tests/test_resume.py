@@ -2,6 +2,7 @@
 
 import os
 import random
+import runpy
 import signal
 import subprocess
 import time
@@ -122,3 +123,13 @@ def test_a_killed_dvc_repro_continues(study, begun, undisturbed):
     assert "Running stage 'train@sim'" in study.run(*command)
     assert digests(study.folder / stage.output) == undisturbed("train")[0]
     assert "didn't change" in study.run(*command)
+
+
+def test_a_shard_of_fewer_demonstrations_is_not_taken_for_a_larger_one(tmp_path, root):
+    """As the last one is when a killed stage begins again with more."""
+    simulate_shard = runpy.run_path(str(root / "stages" / "simulate.py"))["simulate_shard"]
+    what = (tmp_path, 42, "diverse", "push", "diverse", False, 0)
+    fewer = simulate_shard(*what, 2, 32)
+    assert simulate_shard(*what, 2, 32) == fewer
+    more = simulate_shard(*what, 3, 32)
+    assert len(more["rows"]) == more["file"]["clips"] == 3

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from anyview import paths
 from anyview.config import load_params
@@ -22,24 +23,25 @@ from anyview.runtime.outputs import whole_folder, write_atomically
 from anyview.runtime.progress import track
 from anyview.runtime.scratch import checkpoint_folder
 from anyview.runtime.workers import run_tasks
-from anyview.video.datasets import dataset_files
+from anyview.video.datasets import dataset_files, progress_of
 from anyview.video.manifests import read_table
 from anyview.video.sets import StoredFile, write_set, write_shard
 
 
 def render_shard(
-    folder: Path, index: int, contexts: list[str], restrict: Callable[[Context], Context], image_size: int
+    folder: Path, index: int, clips: pd.DataFrame, restrict: Callable[[Context], Context], image_size: int
 ) -> dict[str, Any]:
-    """Make shard ``index``: the demonstrations in ``contexts``, restricted; unless an earlier try did.
+    """Make shard ``index``: the demonstrations of ``clips``, restricted; unless an earlier try did.
 
     Returns its row of files.csv and the contexts that it shows.
     """
 
     def make() -> tuple[dict[str, Any], list[str]]:
-        shown = [restrict(Context.from_json(text)) for text in contexts]
+        shown = [restrict(Context.from_json(text)) for text in clips["context"]]
+        positions, _ = roll_out(shown, progress_of(clips))
         camera = renderer(shown[0].task, image_size)
-        clips = [camera.render_clip(*scene) for scene in zip(shown, roll_out(shown)[0], strict=True)]
-        stored = write_shard(folder, index, np.stack(clips))
+        filmed = [camera.render_clip(*scene) for scene in zip(shown, positions, strict=True)]
+        stored = write_shard(folder, index, np.stack(filmed))
         return {"file": vars(stored), "contexts": [context.to_json() for context in shown]}, [stored.file]
 
     return once(folder, f"shard-{index:04d}", make)
@@ -62,7 +64,7 @@ def main(arguments: list[str]) -> None:
     folder = checkpoint_folder(["diversity-simulate", name, size], dataset_files(source))
 
     tasks = [
-        (folder, index, list(rows["context"]), restriction(views, clutter), size)
+        (folder, index, rows, restriction(views, clutter), size)
         for index, (_, rows) in enumerate(manifest.groupby("shard", sort=False))
     ]
     records = []

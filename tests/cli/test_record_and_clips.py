@@ -49,6 +49,9 @@ def sources(tmp_path_factory) -> Path:
     write_raw(folder / "b.avi", pictures(125, 128, 96), 15.0)
     write_raw(folder / "slow.avi", pictures(82), 5.0)
     write_raw(folder / "short.avi", pictures(20), 10.0)
+    content = write_raw(folder / "damaged.avi", pictures(90), 10.0).read_bytes()
+    at = [found.end() for found in re.finditer(b"00dc", content)][20] + 4  # where the 20th frame's bits begin
+    (folder / "damaged.avi").write_bytes(content[:at] + bytes(60) + content[at + 60 :])
     return folder
 
 
@@ -116,6 +119,7 @@ def test_a_clip_that_a_kill_kept_out_of_the_manifest_is_in_nobodys_way(tmp_path,
         (["--camera", "left={}/a.mp4", "--pair", "../../x"], "'../../x': a name has only"),
         (["--camera", "left={}/a.mp4", "--kind", "odd"], "kind odd: must be one of standard"),
         (["--camera", "left={}/short.avi"], "camera left: the file ends too early"),
+        (["--camera", "left={}/damaged.avi"], r"damaged.avi: damaged: frame 2\d cannot"),
         (
             ["--camera", "left={}/slow.avi", "--seconds", "2"],
             r"camera left: [45]\.\d frames a second, 10 are needed",
@@ -238,5 +242,13 @@ def test_clips_lists_sets_splits_and_refusals_and_writes_a_sheet(tmp_path, root)
     assert found["sets"]["real"] == {"train": 1, "validation": 0, "extreme": 1, "unused": 1}
     assert found["kinds"]["standard"] == {"train": 1, "validation": 0, "extreme": 0, "unused": 1}
     assert found["refused"] == [{"file": "bad.mp4", "pair": "bad", "reason": "damaged: cut short"}]
+    for arguments, said in (
+        (["--propose", "--sheet", "sheet.png"], "--sheet shows ingested clips"),
+        (["--propose", "--from-lerobot", "."], "--propose and --from-lerobot"),
+        (["--camera", "top"], "--camera names those of a LeRobotDataset"),
+    ):
+        code, _, err = run("clips", *arguments, cwd=tmp_path)
+        assert (code, err.count("\n")) == (2, 1)
+        assert err.startswith(f"error: {said}")
     code, _, err = run("clips", "--sheet", "sheet.gif", cwd=tmp_path)
     assert (code, err) == (2, "error: sheet.gif: a contact sheet is a .png file\n")

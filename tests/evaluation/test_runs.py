@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -16,7 +17,7 @@ from anyview.config import load_params
 from anyview.evaluation.methods import Method
 from anyview.evaluation.runs import Work, evaluate_group, groups_of
 from anyview.learners import ddpg
-from anyview.learners.common.policies import load_policy
+from anyview.learners.common.policies import load_policy, save_policies
 from anyview.pusher.batch import PusherBatch
 from anyview.pusher.contexts import sample_contexts
 from anyview.rewards.cells import make_reward
@@ -225,4 +226,30 @@ def test_damaged_policies_are_refused(tmp_path: Path) -> None:
         load_policy(tmp_path, 0)
     (tmp_path / "policy.json").write_text(json.dumps({"contexts": [1]}))
     with pytest.raises(AnyviewError, match="does not describe policies"):
+        load_policy(tmp_path, 0)
+
+
+@pytest.mark.parametrize(
+    ("damage", "complaint"),
+    [
+        ({"learner": "sac"}, "learner 'sac' is none of ddpg, trpo"),
+        ({"control": "warp"}, "control 'warp' is none of twist, torque"),
+        ({"contexts": [1]}, "the context of run 0 is damaged"),
+        ({"azimuth": 1e9}, "the context of run 0 is damaged"),
+        (
+            {"choice": {"colour": "red", "other_xy": [0.0, 0.0]}},
+            "takes 15 inputs; in the context of run 0 there are 17",
+        ),
+    ],
+)
+def test_policies_that_fit_no_world_are_refused(tmp_path: Path, damage: dict, complaint: str) -> None:
+    contexts, _ = sample_contexts(np.random.default_rng(0), 1)
+    weights = {"weight0": np.zeros((1, 15, 3), np.float32), "bias0": np.zeros((1, 3), np.float32)}
+    save_policies(tmp_path, weights, contexts, "trpo", "twist", 32)
+    assert load_policy(tmp_path, 0).context == contexts[0]
+    file = tmp_path / "policy.json"
+    description = json.loads(file.read_text())
+    description["contexts"][0] |= {key: damage.pop(key) for key in ("azimuth", "choice") if key in damage}
+    file.write_text(json.dumps(description | damage))
+    with pytest.raises(AnyviewError, match=re.escape(complaint)):
         load_policy(tmp_path, 0)

@@ -1,9 +1,13 @@
 """Returns and values of clips, against one frame at a time; a reward that looks back sees what it should."""
 
+import runpy
+
 import numpy as np
+import pandas as pd
 
 from anyview.adversarial.tpil import tpil_reward
 from anyview.config import RewardWeights, load_params
+from anyview.evaluation.runs import Work
 from anyview.ranking.scores import rewards, values
 from anyview.rewards.demonstration import DemonstrationReward, translate_demonstrations
 from anyview.video.pixels import to_input
@@ -22,6 +26,22 @@ def test_a_value_is_the_last_steps_reward_of_the_frame_alone(translator, expert_
     worth = values(reward, clips, [1, 20, 49])
     for column, time in enumerate((1, 20, 49)):
         np.testing.assert_allclose(worth[:, column], reward.step(clips[:, None, time], 49)[:, 0], rtol=1e-5)
+
+
+def test_every_method_has_its_own_number_of_contexts(tmp_path, root):
+    """Runs go on counting from choice to choice; contexts start again."""
+    write_table = runpy.run_path(str(root / "stages" / "rank.py"))["write_table"]
+    params = load_params(root / "params.yaml")
+    works = [
+        Work(name, evaluated, None, range(n), [], np.empty(0))
+        for name, evaluated in (("ours", params), ("reach", params.imitating("reach")))
+        for n in [2 * evaluated.imitation.runs]
+    ]
+    tables = [pd.DataFrame({"run": list(work.runs), "return": 0.5}) for work in works]
+    write_table(tmp_path / "values.csv", works, tables)
+    contexts = pd.read_csv(tmp_path / "values.csv").groupby("cell")["context"].apply(list)
+    assert contexts["ours"] == [*range(15), *range(15)]
+    assert contexts["reach"] == [*range(8), *range(8)]
 
 
 def test_a_reward_of_two_frames_is_given_both(expert_clips, root):

@@ -32,8 +32,8 @@ def test_a_plan_of_little_entropy_is_the_best_assignment() -> None:
 
 def test_distances_are_those_between_all_pairs() -> None:
     rng = np.random.default_rng(1)
-    one, other = rng.normal(size=(2, 5, 7)), rng.normal(size=(2, 4, 7))
-    expected = ((one[:, :, None] - other[:, None]) ** 2).sum(-1)
+    one, other = rng.normal(size=(2, 3, 5, 7)), rng.normal(size=(2, 6, 4, 7))
+    expected = ((one[:, :, None, :, None] - other[:, None, :, None]) ** 2).sum(-1)
     found = squared_distances(torch.from_numpy(one), torch.from_numpy(other))
     np.testing.assert_allclose(found.numpy(), expected)
 

@@ -46,6 +46,26 @@ def test_an_error_leaves_the_old_folder_alone(tmp_path, error):
     assert names(tmp_path / "cell") == ["old"]
 
 
+def test_an_error_between_old_and_new_leaves_the_old_folder(tmp_path, monkeypatch):
+    with whole_folder(tmp_path / "cell") as folder:
+        (folder / "old").touch()
+    rename = Path.rename
+
+    def interrupted(path: Path, target: Path) -> Path:
+        if path.name == ".cell.partial":
+            raise KeyboardInterrupt
+        return rename(path, target)
+
+    def replace() -> None:
+        with whole_folder(tmp_path / "cell"):
+            monkeypatch.setattr(Path, "rename", interrupted)
+
+    with pytest.raises(KeyboardInterrupt):
+        replace()
+    assert names(tmp_path) == ["cell"]
+    assert names(tmp_path / "cell") == ["old"]
+
+
 def test_leftovers_of_a_killed_process_are_not_mixed_in(tmp_path):
     script = (
         "import os, sys, pathlib; from anyview.runtime.outputs import whole_folder\n"

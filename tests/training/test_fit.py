@@ -142,6 +142,14 @@ def test_a_cell_may_have_a_learning_rate_and_schedule_of_its_own(make_objective)
     assert (own.training.learning_rate, own.training.schedule) == (0.004, "cosine")
 
 
+def test_places_that_nothing_teaches_are_refused(make_objective):
+    made = make_objective(iterations=4)
+    weights = made.cell.weights.model_copy(update={"places": 1.0})
+    cell = made.cell.model_copy(update={"architecture": "keypoint", "weights": weights})
+    with pytest.raises(AnyviewError, match=r"data set diverse: no marks"):
+        TranslatorObjective(cell, made.training, 1, made.dataset)
+
+
 def test_pretraining_on_frames_of_another_size_is_refused(make_objective, discs):
     made = make_objective()
     other = Dataset("rendered", disc_clips(4, size=32), clip_table(["train"] * 2 + ["validation"] * 2))

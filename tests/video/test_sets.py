@@ -1,5 +1,6 @@
 """Video files and decoded sets: lossless, whole, and clear about damage."""
 
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -94,6 +95,23 @@ def test_a_decoded_file_that_was_cut_short_is_made_again(tmp_path, scratch):
     decoded = next(scratch.rglob("frames.npy"))
     decoded.write_bytes(decoded.read_bytes()[:-1000])
     np.testing.assert_array_equal(open_frames(tmp_path / "set").frames, clips)
+
+
+def test_half_decoded_files_go_with_their_process_unless_another_machine_is_at_work(tmp_path, scratch):
+    make_set(tmp_path / "set")
+    open_frames(tmp_path / "set")
+    decoded = next(scratch.rglob("frames.npy"))
+    decoded.unlink()
+    dead = subprocess.Popen(["true"])
+    dead.wait()
+    ours, theirs = (
+        decoded.with_name(f"partial-{host}-{dead.pid}") for host in (socket.gethostname(), "other")
+    )
+    for partial in (ours, theirs):
+        partial.touch()
+    open_frames(tmp_path / "set")
+    assert theirs.exists()
+    assert not ours.exists()
 
 
 @pytest.mark.parametrize("damage", ["missing", "truncated", "altered"])

@@ -46,6 +46,7 @@ class Camera:
         self._stopping = threading.Event()
         self._changed = threading.Condition()
         self._ended = False
+        self._damage: AnyviewError | None = None
         device = _device_number(name, source)
         self._is_file = device is None
         self._pictures = _filmed(device) if device is not None else self._played(Path(source))
@@ -66,6 +67,8 @@ class Camera:
         """Wait for a frame newer than ``after``; raises AnyviewError when none comes."""
         with self._changed:
             self._changed.wait_for(lambda: self._newest[1] > after or self._ended, PATIENCE)
+        if self._damage is not None:
+            raise self._damage
         if self._newest[1] <= after:
             reason = "the file ends too early" if self._is_file else "no frame comes; was it unplugged?"
             raise AnyviewError(f"camera {self.name}: {reason}")
@@ -81,16 +84,20 @@ class Camera:
         self._thread.join()
 
     def _watch(self) -> None:
-        with closing(self._pictures):
-            for picture in self._pictures:
-                if self._stopping.is_set():
-                    return
-                with self._changed:
-                    self._newest = (picture, time.monotonic())
-                    self._changed.notify_all()
-        with self._changed:
-            self._ended = True
-            self._changed.notify_all()
+        try:
+            with closing(self._pictures):
+                for picture in self._pictures:
+                    if self._stopping.is_set():
+                        return
+                    with self._changed:
+                        self._newest = (picture, time.monotonic())
+                        self._changed.notify_all()
+        except AnyviewError as damage:  # a video that cannot be decoded to its end
+            self._damage = damage
+        finally:
+            with self._changed:
+                self._ended = True
+                self._changed.notify_all()
 
     def _played(self, path: Path) -> Generator[np.ndarray, None, None]:
         """The pictures of a file, the first one again at ``roll`` and each later one when it is due."""

@@ -42,6 +42,12 @@ def clips(
 
     if sheet is not None and sheet.suffix.lower() != ".png":
         raise AnyviewError(f"{sheet}: a contact sheet is a .png file")
+    if sheet is not None and (propose or from_lerobot is not None):
+        raise AnyviewError("--sheet shows ingested clips: not with --propose or --from-lerobot")
+    if propose and from_lerobot is not None:
+        raise AnyviewError("--propose and --from-lerobot both write a manifest: one of them")
+    if camera and from_lerobot is None:
+        raise AnyviewError("--camera names those of a LeRobotDataset: only with --from-lerobot")
     if propose:
         _propose(raw, as_json)
         return

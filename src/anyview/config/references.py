@@ -2,12 +2,15 @@
 
 from collections.abc import Collection, Iterator
 
+from anyview.config.data import DemonstrationSet
 from anyview.config.explanations import brief
+from anyview.config.imitation import BeyondCell, GoalCell
 from anyview.config.params import Params
 from anyview.paths import REAL, RENDERED
 from anyview.runtime.errors import AnyviewError
 
 _HANDS_TASK = "push"  # what is done in the rig's clips
+_STEPS = 49  # of an episode
 
 
 def check_references(params: Params, name: str) -> None:
@@ -19,6 +22,28 @@ def check_references(params: Params, name: str) -> None:
             raise AnyviewError(f"{name}: {key}: {brief(found)} is none of these: {listed}")
     _refuse_pretraining_alone(params, name)
     _refuse_clips_that_nobody_sees(params, name)
+    _refuse_a_short_memory(params, name)
+
+
+def _as_hands_do(wanted: DemonstrationSet) -> bool:
+    """Whether clips of the rig show what is done in this set: one goal, at the script's tempo."""
+    return (wanted.task, wanted.contexts != "choice", wanted.tempo) == (_HANDS_TASK, True, "script")
+
+
+def _by_transport(cell: BeyondCell | GoalCell) -> bool:
+    """Whether a frame has no value by itself."""
+    return isinstance(cell, BeyondCell) and cell.matching == "transport"
+
+
+def _refuse_a_short_memory(params: Params, name: str) -> None:
+    """Refuse a replay that does not hold the episodes of an iteration."""
+    replay = params.imitation.ddpg.replay
+    for block in (params.imitation, params.beyond):
+        if replay < _STEPS * block.episodes_per_iteration:
+            raise AnyviewError(
+                f"{name}: imitation.ddpg.replay: {replay} steps are less than an iteration's "
+                f"{block.episodes_per_iteration} episodes of {_STEPS}"
+            )
 
 
 def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
@@ -27,23 +52,26 @@ def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
     yield from ((f"split.{name}", name, sets) for name in params.split)
     yield from ((f"beyond.split.{name}", name, list(params.beyond.sets)) for name in params.beyond.split)
     simulated = params.demonstration_sets
-    pushes = [name for name, wanted in simulated.items() if wanted.task == _HANDS_TASK]
+    by_hand = [name for name, wanted in simulated.items() if _as_hands_do(wanted)]
     for key, beyond in params.beyond.translators.items():
         yield f"beyond.translators.{key}.dataset", beyond.dataset, list(simulated)
         if beyond.other_experts:
             yield f"beyond.translators.{key}.experts", beyond.other_experts, [REAL, RENDERED]
-            yield f"beyond.translators.{key}.dataset", beyond.dataset, pushes
+            yield f"beyond.translators.{key}.dataset", beyond.dataset, by_hand
         before = [REAL, RENDERED] if beyond.other_experts else list(simulated)
         yield f"beyond.translators.{key}.pretraining.dataset", beyond.pretraining.dataset, before
     for key, method in params.beyond.cells.items():
-        yield f"beyond.cells.{key}.dataset", method.dataset, list(params.demonstration_sets)
+        known = by_hand if method.other_experts else list(simulated)
+        yield f"beyond.cells.{key}.dataset", method.dataset, known
         yield f"beyond.cells.{key}.experts", method.experts, [method.dataset, REAL]
         fitting = params.beyond.embeddings if method.reward == "goal" else params.translator_cells
         yield f"beyond.cells.{key}.model", method.model, list(fitting)
     for key, embedding in params.beyond.embeddings.items():
-        yield f"beyond.embeddings.{key}.dataset", embedding.dataset, list(params.demonstration_sets)
+        known = by_hand if embedding.other_experts else list(simulated)
+        yield f"beyond.embeddings.{key}.dataset", embedding.dataset, known
         yield f"beyond.embeddings.{key}.experts", embedding.experts, [embedding.dataset, REAL]
-    ranked = [*params.methods, *params.beyond.cells]
+    by_step = [key for key, cell in params.beyond.cells.items() if not _by_transport(cell)]
+    ranked = [*params.methods, *by_step]
     yield from (("beyond.ranking.methods", name, ranked) for name in params.beyond.ranking.methods)
     for block, models in (("translators", params.translators), ("embeddings", params.embeddings)):
         yield from ((f"{block}.{key}.dataset", cell.dataset, sets) for key, cell in models.items())

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from anyview.config.values import Block, Count, CountOrNone, NonNegative, Positive, WithExperts
+from anyview.config.values import Block, Count, CountOrNone, KeyRefused, NonNegative, Positive, WithExperts
 
 
 class LossWeights(Block):
@@ -70,9 +70,18 @@ class TranslatorCell(WithExperts):
     )
 
     @model_validator(mode="after")
+    def _places_of_keypoints(self) -> "TranslatorCell":
+        if self.weights.places and not self.architecture.startswith("keypoint"):
+            raise KeyRefused("weights.places", f"{self.architecture} has no keypoints to teach places")
+        return self
+
+    @model_validator(mode="after")
     def _experts_alone(self) -> "TranslatorCell":
         if self.other_experts and (self.augment or self.pairs != "any"):
-            raise ValueError("other experts' clips are not augmented, and paired with `any` of the cell's")
+            key = "augment" if self.augment else "pairs"
+            raise KeyRefused(
+                key, "other experts' clips are not augmented, and paired with `any` of the cell's"
+            )
         return self
 
 

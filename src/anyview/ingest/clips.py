@@ -106,6 +106,8 @@ def ingest_clip(source: Path, folder: Path, candidate: Candidate, limits: Ingest
             content += sha256(times)
     except Refused as refusal:
         return Verdict(str(refusal))
+    except OSError as error:
+        return Verdict(f"cannot be read: {error.strerror}")
 
     def make() -> tuple[dict[str, Any], list[str]]:
         try:

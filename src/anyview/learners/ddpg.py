@@ -182,8 +182,8 @@ class DDPG:
     def end_iteration(self, rescored: np.ndarray | None = None) -> None:
         """Store the episodes; then take the iteration's updates.
 
-        Where the reward has learned, batches are of the ``rescored`` (R, E, T) episodes alone: rewards of one
-        scale, as in discriminator-actor-critic (Kostrikov et al. 2019).
+        Where there are ``rescored`` (R, E, T) episodes, batches are of these alone: rewards of one scale, as
+        in discriminator-actor-critic (Kostrikov et al. 2019).
         """
         params = self._params
         observations, actions, rewards, next_observations = (

@@ -234,7 +234,7 @@ class TRPO:
     def end_iteration(self, rescored: np.ndarray | None = None) -> None:
         """Add the iteration's episodes to the batch; take a policy step when the batch is full.
 
-        Where the reward has learned, the batch's newest episodes earn what ``rescored`` (R, E, T) says.
+        The batch's newest episodes earn what ``rescored`` (R, E, T) says, where there is any.
         """
         if len(self._episode) != self._horizon:
             raise ValueError(f"an iteration ended after {len(self._episode)} of {self._horizon} steps")

@@ -71,20 +71,27 @@ def read_table(path: Path, addresses: Collection[str]) -> dict[str, Duration]:
     Raises AnyviewError if one of its stages is not of ``addresses`` or one of its numbers is none.
     """
     table = {}
-    with path.open(newline="", encoding="utf-8") as file:
-        for number, row in enumerate(csv.DictReader(file), 2):
-            try:
-                stage, seconds, cores = row["stage"], float(row["seconds"]), int(row["cores"])
-            except (KeyError, TypeError, ValueError):
-                raise AnyviewError(
-                    f"{path}, line {number}: needs the columns stage, seconds, cores; two are numbers"
-                ) from None
-            if stage not in addresses or not seconds >= 0 or cores < 1:
-                raise AnyviewError(
-                    f"{path}, line {number}: {stage} is no stage here, or its numbers are not positive"
-                )
-            table[stage] = Duration(seconds, cores)
+    for number, row in enumerate(_rows(path), 2):
+        try:
+            stage, seconds, cores = row["stage"], float(row["seconds"]), int(row["cores"])
+        except (KeyError, TypeError, ValueError):
+            raise AnyviewError(
+                f"{path}, line {number}: needs the columns stage, seconds, cores; two are numbers"
+            ) from None
+        if stage not in addresses or not seconds >= 0 or cores < 1:
+            raise AnyviewError(
+                f"{path}, line {number}: {stage} is no stage here, or its numbers are not positive"
+            )
+        table[stage] = Duration(seconds, cores)
     return table
+
+
+def _rows(path: Path) -> list[dict[str, str]]:
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            return list(csv.DictReader(file))
+    except (csv.Error, UnicodeError) as error:
+        raise AnyviewError(f"{path}: not a table: {error}") from None
 
 
 def _read(path: Path) -> dict[str, Duration]:

@@ -71,12 +71,14 @@ class TransportReward:
 
     def _rewards(self) -> Tensor:
         """Of the episodes that were seen, (R, C, T)."""
-        cost: Tensor | float = 0.0
         terms = zip(zip(*self._seen, strict=True), self._targets, self._factors, strict=True)
-        for seen, targets, factor in terms:
-            episodes = torch.stack(seen, dim=2)  # (R, C, T, F)
-            cost = cost + factor * squared_distances(episodes[:, :, None], targets[:, None])
-        assert isinstance(cost, Tensor)
+        cost = torch.stack(
+            [
+                factor * squared_distances(torch.stack(seen, dim=2), targets)
+                for seen, targets, factor in terms
+                if factor.any()
+            ]
+        ).sum(0)
         paid = (transport_plan(cost, _ENTROPY, _ITERATIONS) * cost).sum(-1)
         return -paid.mean(2) * cost.shape[-2]
 
@@ -103,10 +105,12 @@ class TransportReward:
         return np.concatenate([self._first[:, None], to_frames(self._shown)], axis=1)
 
 
-def squared_distances(one: Tensor, other: Tensor) -> Tensor:
-    """|one_t - other_j|^2 of vectors (..., T, F) and (..., J, F): (..., T, J)."""
-    products = one @ other.mT
-    squares = one.square().sum(-1)[..., None] + other.square().sum(-1)[..., None, :]
+def squared_distances(episodes: Tensor, clips: Tensor) -> Tensor:
+    """|e_t - c_j|^2 of vectors (R, C, T, F) and (R, m, J, F), of each episode and clip: (R, C, m, T, J)."""
+    # One product a run: pictures are too many numbers to be spread over all pairs.
+    products = (episodes.flatten(1, 2) @ clips.flatten(1, 2).mT).unflatten(1, episodes.shape[1:3])
+    products = products.unflatten(3, clips.shape[1:3]).transpose(2, 3)
+    squares = episodes.square().sum(-1)[:, :, None, :, None] + clips.square().sum(-1)[:, None, :, None, :]
     return (squares - 2 * products).clamp_min(0.0)
 
 

@@ -24,6 +24,8 @@ def whole_folder(target: Path) -> Iterator[Path]:
             target.rename(previous)
         partial.rename(target)
     finally:
+        if previous.exists() and not target.exists():
+            previous.rename(target)
         for leftover in (partial, previous):
             shutil.rmtree(leftover, ignore_errors=True)
 

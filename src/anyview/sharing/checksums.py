@@ -1,11 +1,11 @@
 """Model folders from elsewhere, and their checksums: nothing is loaded before these are compared."""
 
-import hashlib
 import re
 from pathlib import Path
 
 from anyview import paths
 from anyview.runtime.errors import AnyviewError
+from anyview.runtime.once import sha256
 
 CARD, SUMS = "README.md", "SHA256SUMS"
 POLICIES = "policies"
@@ -66,8 +66,3 @@ def files_of(folder: Path) -> list[str]:
     """Files of a model folder that have a checksum, by their names in it."""
     names = [path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()]
     return sorted(name for name in names if name not in (CARD, SUMS))
-
-
-def sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

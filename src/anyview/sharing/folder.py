@@ -24,8 +24,9 @@ from anyview.report.provenance import dvc_hash
 from anyview.review.results import LOCK, read_lock
 from anyview.review.revisions import Revision
 from anyview.runtime.errors import AnyviewError
+from anyview.runtime.once import sha256
 from anyview.runtime.outputs import write_atomically
-from anyview.sharing.checksums import CARD, POLICIES, SUMS, files_of, find_policies, sha256
+from anyview.sharing.checksums import CARD, POLICIES, SUMS, files_of, find_policies
 from anyview.video.files import write_video
 
 ROLLOUT, PROVENANCE, MODEL = "rollout.mp4", "provenance.yaml", "model"

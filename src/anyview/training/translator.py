@@ -41,7 +41,8 @@ class TranslatorObjective:
     """See ``fit.Objective``. Losses: L, L_tr, L_rec and L_align, NaN where the cell leaves one out.
 
     The first ``cell.pretraining.iterations`` learn from the data set ``pretraining``, the others from
-    ``dataset``, which also validates from the start. Raises AnyviewError if their frames differ in size.
+    ``dataset``, which also validates from the start. Raises AnyviewError if their frames differ in size,
+    or if nothing teaches the places that the cell weighs.
     """
 
     names = ("loss", *NAMES)
@@ -59,6 +60,8 @@ class TranslatorObjective:
         if self._pretraining.image_size != dataset.image_size:
             sizes = f"{self._pretraining.image_size} and {dataset.image_size} pixels"
             raise AnyviewError(f"data sets {self._pretraining.name} and {dataset.name}: frames of {sizes}")
+        if cell.weights.places and all(learnt.marks is None for learnt in self._learnt()):
+            raise AnyviewError(f"data set {dataset.name}: no marks, which the weight of places needs")
         own = {"learning_rate": cell.learning_rate, "schedule": cell.schedule}
         self.training = training.model_copy(update={key: value for key, value in own.items() if value})
         self.optimizer = _OPTIMIZERS[cell.optimizer]

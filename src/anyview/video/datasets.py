@@ -93,9 +93,7 @@ class Dataset:
     @cached_property
     def progress(self) -> np.ndarray | None:
         """How far the script has come at each frame, in its steps (N, T), if clips do not keep its time."""
-        if "progress" not in self.clips:
-            return None
-        return np.array([text.split() for text in self.clips["progress"]], float)
+        return progress_of(self.clips)
 
     @cached_property
     def seconds(self) -> np.ndarray:
@@ -106,6 +104,16 @@ class Dataset:
         if "times" in self.clips:
             return np.array([text.split() for text in self.clips["times"]], float)
         return np.broadcast_to(seconds_of(self.length), self.frames.shape[:2])
+
+
+def progress_of(clips: pd.DataFrame) -> np.ndarray | None:
+    """How far the script has come at each frame of a manifest's ``clips``, in its steps (N, T).
+
+    None where all keep its time.
+    """
+    if "progress" not in clips:
+        return None
+    return np.array([text.split() for text in clips["progress"]], float)
 
 
 def open_dataset(name: str, experts: str | None = None) -> Dataset:

@@ -10,9 +10,9 @@ To make one, call ``write_clips`` or ``write_shard`` for each file, from paralle
 """
 
 import errno
-import hashlib
 import math
 import os
+import socket
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
@@ -25,6 +25,7 @@ import psutil
 
 from anyview.runtime.device import worker_count
 from anyview.runtime.errors import AnyviewError
+from anyview.runtime.once import sha256
 from anyview.runtime.outputs import write_atomically
 from anyview.runtime.scratch import content_key, scratch_folder
 from anyview.video.files import Codec, video_frames, write_video
@@ -54,7 +55,7 @@ class FrameStore:
 
 def stored_file(path: Path, clips: int, frames: int) -> StoredFile:
     """The row of ``files.csv`` for a file of ``clips`` clips of ``frames`` frames each."""
-    return StoredFile(path.name, clips, frames, _sha256(path))
+    return StoredFile(path.name, clips, frames, sha256(path))
 
 
 def write_clips(path: Path, clips: np.ndarray, rate: float, codec: Codec = "FFV1") -> StoredFile:
@@ -141,16 +142,11 @@ def _read_files(folder: Path) -> list[StoredFile]:
     return files
 
 
-def _sha256(path: Path) -> str:
-    with path.open("rb") as handle:
-        return hashlib.file_digest(handle, "sha256").hexdigest()
-
-
 def _check(folder: Path, stored: StoredFile) -> None:
     path = folder / stored.file
     if not path.is_file():
         raise AnyviewError(f"{path}: missing; run `dvc checkout` or the stage that makes it")
-    if _sha256(path) != stored.sha256:
+    if sha256(path) != stored.sha256:
         raise AnyviewError(f"{path}: cut short or altered since it was written; run `dvc checkout --force`")
 
 
@@ -167,7 +163,7 @@ def _decode(folder: Path, files: list[StoredFile], target: Path) -> None:
     picture = next(video_frames(folder / files[0].file)).shape
     shape = (sum(stored.clips for stored in files), files[0].frames, *picture)
     starts = np.cumsum([0, *(stored.clips * stored.frames for stored in files)]) * math.prod(picture)
-    partial = target.with_name(f"partial-{os.getpid()}")
+    partial = target.with_name(f"{_partials_of_this_machine()}{os.getpid()}")
     try:
         with partial.open("wb") as handle:
             header = {"descr": "|u1", "fortran_order": False, "shape": shape}
@@ -197,8 +193,16 @@ def _decode(folder: Path, files: list[StoredFile], target: Path) -> None:
         partial.unlink(missing_ok=True)
 
 
+def _partials_of_this_machine() -> str:
+    """What their names begin with: others may share the folder, and have processes of the same numbers."""
+    return f"partial-{socket.gethostname()}-"
+
+
 def _remove_partials_of_the_dead(target: Path) -> None:
+    ours = _partials_of_this_machine()
     for partial in target.parent.glob("partial-*"):
-        pid = partial.name.removeprefix("partial-")
+        if not partial.name.startswith(ours):
+            continue
+        pid = partial.name.removeprefix(ours)
         if not (pid.isdigit() and psutil.pid_exists(int(pid))):
             partial.unlink(missing_ok=True)

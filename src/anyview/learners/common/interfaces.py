@@ -34,8 +34,8 @@ class Learner(Protocol):
     def end_iteration(self, rescored: np.ndarray | None = None) -> None:
         """All episodes of an iteration have ended.
 
-        ``rescored`` (R, E, T), where the reward has learned, are the rewards of the newest E episodes as it
-        gives them now, the oldest first. They replace what was recorded.
+        ``rescored`` (R, E, T), where what was recorded does not stand, are the rewards of the newest E
+        episodes, the oldest first. They replace it.
         """
         ...
 
@@ -64,7 +64,10 @@ class RewardSource(Protocol):
         ...
 
     def rescored(self) -> np.ndarray | None:
-        """Rewards (R, E, T) of the newest E episodes as it gives them now; None where it never changes."""
+        """Rewards (R, E, T) of the newest E episodes, where ``step`` did not give what stands; or None.
+
+        For a reward that has learned since, or knows an episode's rewards only when it has ended.
+        """
         ...
 
     def state(self) -> Arrays:

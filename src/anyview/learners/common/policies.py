@@ -4,7 +4,7 @@ import json
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 import torch
@@ -13,12 +13,13 @@ from safetensors.numpy import load, save
 from torch import Tensor
 
 from anyview.learners.common.interfaces import Arrays
-from anyview.pusher.batch import ACTION_SIZE, OBSERVATION_SIZE
+from anyview.pusher.batch import ACTION_SIZE, observation_size
 from anyview.pusher.contexts import Context
 from anyview.runtime.errors import AnyviewError
 from anyview.runtime.outputs import write_atomically
 
 LearnerName = Literal["ddpg", "trpo"]
+ControlName = Literal["twist", "torque"]
 _DESCRIPTION = "policy.json"
 
 
@@ -41,7 +42,7 @@ class Policy:
     """
 
     learner: LearnerName
-    control: str
+    control: ControlName
     image_size: int
     context: Context
     weights: Arrays
@@ -66,7 +67,7 @@ def save_policies(
     weights: Arrays,
     contexts: list[Context],
     learner: LearnerName,
-    control: str,
+    control: ControlName,
     image_size: int,
 ) -> None:
     """Write the policies ``weights`` (R, ...) of runs 0 to R - 1 and what is needed to act with them."""
@@ -99,8 +100,11 @@ def load_policy(folder: Path, run: int) -> Policy:
         raise AnyviewError(f"{path}: does not hold the weights of a policy; run the cell again")
     try:
         context = Context.from_json(json.dumps(description["contexts"][run]))
-    except (KeyError, TypeError):
+    except (KeyError, TypeError, ValueError):
         raise AnyviewError(f"{folder / _DESCRIPTION}: the context of run {run} is damaged") from None
+    entries, inputs = observation_size(context.task, len(context.goals)), len(weights["weight0"])
+    if inputs < entries or (description["learner"] == "trpo" and inputs > entries):
+        raise AnyviewError(f"{path}: takes {inputs} inputs; in the context of run {run} there are {entries}")
     return Policy(description["learner"], description["control"], description["image_size"], context, weights)
 
 
@@ -112,8 +116,12 @@ def _read_description(path: Path) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         raise AnyviewError(f"{path}: not valid JSON: {error}") from None
     keys = {"learner": str, "control": str, "image_size": int, "contexts": list}
+    known = {"learner": get_args(LearnerName), "control": get_args(ControlName)}
     if not isinstance(values, dict) or any(not isinstance(values.get(k), kind) for k, kind in keys.items()):
         raise AnyviewError(f"{path}: does not describe policies: needs {', '.join(keys)}")
+    for key, names in known.items():
+        if values[key] not in names:
+            raise AnyviewError(f"{path}: {key} {values[key]!r} is none of {', '.join(names)}")
     return values
 
 
@@ -128,4 +136,4 @@ def _fits(weights: Arrays) -> bool:
     if any(w.ndim != 2 or b.shape != w.shape[1:] for w, b in zip(matrices, biases, strict=True)):
         return False
     chained = all(a.shape[1] == b.shape[0] for a, b in pairwise(matrices))
-    return chained and matrices[0].shape[0] >= OBSERVATION_SIZE and matrices[-1].shape[1] == ACTION_SIZE
+    return chained and matrices[-1].shape[1] == ACTION_SIZE
