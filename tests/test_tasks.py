@@ -31,8 +31,9 @@ def run(root: Path, folder: Path, *arguments: str) -> subprocess.CompletedProces
 
 
 def stage(root: Path, folder: Path, name: str, cell: str) -> subprocess.CompletedProcess[str]:
-    """Run a stage's script in ``folder``."""
-    return run(root, folder, str(root / f"stages/{name}.py"), cell)
+    """Run the script in ``folder`` that a stage of beyond/dvc.yaml runs."""
+    script = "beyond/train.py" if name == "train" else f"stages/{name}.py"
+    return run(root, folder, str(root / script), cell)
 
 
 def small_study(root: Path, folder: Path, *tasks: str) -> None:
