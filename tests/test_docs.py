@@ -230,4 +230,14 @@ def test_the_front_page_has_the_numbers_of_what_goes_beyond_the_thesis():
         f"in {placed['real-adam', 'validation']} of held-out frames",
         f"has {placed['real-pretrained', 'validation']}, and {placed['real-pretrained', 'extreme']} where",
     ]
+    study = json.loads((ROOT / "docs/study/beyond/beyond.json").read_text(encoding="utf-8"))
+    chosen = [
+        count(study["choice"][cell], "shown_rate") for cell in ("choice", "choice-oracle", "choice-clock")
+    ]
+    wrong = round(30 * study["choice"]["choice"]["other_rate"])
+    ours, true = (
+        ", ".join(count(study["tasks"][f"{task}{end}"]) for task in ("reach", "strike", "sweep"))
+        for end in ("", "-oracle")
+    )
+    told += [f"| {chosen[0]}, {wrong}; {chosen[1]}, {chosen[2]} |", f"| {ours} ({true}) |"]
     assert [line for line in told if line not in page] == []
