@@ -27,7 +27,7 @@ def check_references(params: Params, name: str) -> None:
 
 def _as_hands_do(wanted: DemonstrationSet) -> bool:
     """Whether clips of the rig show what is done in this set: one goal, at the script's tempo."""
-    return (wanted.task, wanted.contexts != "choice", wanted.tempo) == (_HANDS_TASK, True, "script")
+    return wanted.task == _HANDS_TASK and wanted.contexts != "choice" and wanted.tempo == "script"
 
 
 def _by_transport(cell: BeyondCell | GoalCell) -> bool:
