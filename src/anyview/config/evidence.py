@@ -46,7 +46,7 @@ class Losses(Block):
     @model_validator(mode="after")
     def _others_of_these(self) -> "Losses":
         if not set(self.others.seeds) <= set(self.seeds):
-            raise KeyRefused("others.seeds", "some of them are not in seeds")
+            raise KeyRefused("others.seeds", "some of them are not in evidence.losses.seeds")
         if twice := self.rewards.keys() & self.others.rewards.keys():
             raise KeyRefused(f"others.rewards.{min(twice)}", "the name is taken by rewards")
         return self

@@ -6,6 +6,7 @@ from anyview.config.data import DemonstrationSet
 from anyview.config.explanations import brief
 from anyview.config.imitation import BeyondCell, GoalCell
 from anyview.config.params import Params
+from anyview.config.values import WithExperts
 from anyview.paths import REAL, RENDERED
 from anyview.runtime.errors import AnyviewError
 
@@ -38,11 +39,11 @@ def _by_transport(cell: BeyondCell | GoalCell) -> bool:
 def _refuse_a_short_memory(params: Params, name: str) -> None:
     """Refuse a replay that does not hold the episodes of an iteration."""
     replay = params.imitation.ddpg.replay
-    for block in (params.imitation, params.beyond):
+    for key, block in (("imitation", params.imitation), ("beyond", params.beyond)):
         if replay < _STEPS * block.episodes_per_iteration:
             raise AnyviewError(
                 f"{name}: imitation.ddpg.replay: {replay} steps are less than an iteration's "
-                f"{block.episodes_per_iteration} episodes of {_STEPS}"
+                f"{block.episodes_per_iteration} episodes of {_STEPS} ({key}.episodes_per_iteration)"
             )
 
 
@@ -52,24 +53,16 @@ def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
     yield from ((f"split.{name}", name, sets) for name in params.split)
     yield from ((f"beyond.split.{name}", name, list(params.beyond.sets)) for name in params.beyond.split)
     simulated = params.demonstration_sets
-    by_hand = [name for name, wanted in simulated.items() if _as_hands_do(wanted)]
     for key, beyond in params.beyond.translators.items():
-        yield f"beyond.translators.{key}.dataset", beyond.dataset, list(simulated)
-        if beyond.other_experts:
-            yield f"beyond.translators.{key}.experts", beyond.other_experts, [REAL, RENDERED]
-            yield f"beyond.translators.{key}.dataset", beyond.dataset, by_hand
+        yield from _clips_of(f"beyond.translators.{key}", beyond, [REAL, RENDERED], simulated)
         before = [REAL, RENDERED] if beyond.other_experts else list(simulated)
         yield f"beyond.translators.{key}.pretraining.dataset", beyond.pretraining.dataset, before
     for key, method in params.beyond.cells.items():
-        known = by_hand if method.other_experts else list(simulated)
-        yield f"beyond.cells.{key}.dataset", method.dataset, known
-        yield f"beyond.cells.{key}.experts", method.experts, [method.dataset, REAL]
+        yield from _clips_of(f"beyond.cells.{key}", method, [method.dataset, REAL], simulated)
         fitting = params.beyond.embeddings if method.reward == "goal" else params.translator_cells
         yield f"beyond.cells.{key}.model", method.model, list(fitting)
     for key, embedding in params.beyond.embeddings.items():
-        known = by_hand if embedding.other_experts else list(simulated)
-        yield f"beyond.embeddings.{key}.dataset", embedding.dataset, known
-        yield f"beyond.embeddings.{key}.experts", embedding.experts, [embedding.dataset, REAL]
+        yield from _clips_of(f"beyond.embeddings.{key}", embedding, [embedding.dataset, REAL], simulated)
     by_step = [key for key, cell in params.beyond.cells.items() if not _by_transport(cell)]
     ranked = [*params.methods, *by_step]
     yield from (("beyond.ranking.methods", name, ranked) for name in params.beyond.ranking.methods)
@@ -94,6 +87,17 @@ def _references(params: Params) -> Iterator[tuple[str, str, Collection[str]]]:
     ):
         having = [name for name, cell in params.imitation.cells.items() if cell.model == model]
         yield from ((f"evidence.headline.{key}", name, having) for name in methods)
+
+
+def _clips_of(
+    key: str, block: WithExperts, experts: Collection[str], simulated: dict[str, DemonstrationSet]
+) -> Iterator[tuple[str, str, Collection[str]]]:
+    """As ``_references``, the sets of a ``block``: of other experts' clips the own ones show the same."""
+    yield f"{key}.dataset", block.dataset, list(simulated)
+    if block.other_experts:
+        yield f"{key}.experts", block.other_experts, experts
+        by_hand = [name for name, wanted in simulated.items() if _as_hands_do(wanted)]
+        yield f"{key}.dataset", block.dataset, by_hand
 
 
 def _refuse_clips_that_nobody_sees(params: Params, name: str) -> None:
