@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import torch
-from torch.nn import functional as F
 
 _RANGE = 255.0
 _WINDOW, _SIGMA = 11, 1.5
@@ -24,10 +23,7 @@ def ssim(clip: np.ndarray, reference: np.ndarray) -> float:
     Wang, Bovik, Sheikh and Simoncelli (2004): Gaussian windows of 11x11 pixels with sigma 1.5, K1 = 0.01,
     K2 = 0.03.
     """
-    x, y = (
-        torch.from_numpy(frames).double().movedim(-1, 1).flatten(0, 1)[:, None]
-        for frames in (clip, reference)
-    )
+    x, y = (torch.from_numpy(frames).double().movedim(-1, 1).flatten(0, 1) for frames in (clip, reference))
     means = _blur(torch.cat((x, y, x * x, y * y, x * y)))
     mx, my, xx, yy, xy = means.chunk(5)
     similarity = (2 * mx * my + _C1) * (2 * (xy - mx * my) + _C2)
@@ -36,7 +32,12 @@ def ssim(clip: np.ndarray, reference: np.ndarray) -> float:
 
 
 def _blur(pictures: torch.Tensor) -> torch.Tensor:
-    offsets = torch.arange(_WINDOW, dtype=torch.float64) - _WINDOW // 2
-    kernel = torch.exp(-(offsets**2) / (2 * _SIGMA**2))
-    kernel /= kernel.sum()
-    return F.conv2d(F.conv2d(pictures, kernel[None, None, None]), kernel[None, None, :, None])
+    rows, columns = map(_windows, pictures.shape[-2:])
+    return rows @ pictures @ columns.T  # PyTorch convolves doubles ten times as slowly
+
+
+def _windows(side: int) -> torch.Tensor:
+    """The weights (S - 10, S) of the S pixels of a line in each window that is whole."""
+    offsets = torch.arange(side) - torch.arange(side - _WINDOW + 1)[:, None] - _WINDOW // 2
+    weights = torch.exp(-(offsets.double() ** 2) / (2 * _SIGMA**2)) * (offsets.abs() <= _WINDOW // 2)
+    return weights / weights.sum(1, keepdim=True)
