@@ -239,5 +239,10 @@ def test_the_front_page_has_the_numbers_of_what_goes_beyond_the_thesis():
         ", ".join(count(study["tasks"][f"{task}{end}"]) for task in ("reach", "strike", "sweep"))
         for end in ("", "-oracle")
     )
-    told += [f"| {chosen[0]}, {wrong}; {chosen[1]}, {chosen[2]} |", f"| {ours} ({true}) |"]
+    human = study["imitation"]["human"]
+    told += [
+        f"| {chosen[0]}, {wrong}; {chosen[1]}, {chosen[2]} |",
+        f"| {count(human)}, median {centimetres(human)}; not run |",
+        f"| {ours} ({true}) |",
+    ]
     assert [line for line in told if line not in page] == []
