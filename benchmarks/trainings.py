@@ -11,7 +11,6 @@ import os
 import sys
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from anyview import paths
@@ -22,7 +21,6 @@ from anyview.evaluation.methods import Method
 from anyview.evaluation.stage import evaluate_method
 from anyview.learners import ddpg
 from anyview.rewards.cells import make_reward
-from anyview.tasks.push import TOLERANCE
 from anyview.training.common.fit import fit
 from anyview.training.translator import TranslatorObjective
 from anyview.video.datasets import open_dataset
@@ -50,7 +48,7 @@ def main(seeds: list[int]) -> None:
     ours = params.imitation.cells[CELL]
     translator = params.translators[ours.model]
     dataset = open_dataset(translator.dataset)
-    distances = []
+    tables = []
     for seed in seeds:
         model = paths.replicate(ours.model, seed)
         fit(model, TranslatorObjective(translator, params.training, seed, dataset), paths.model(model))
@@ -59,17 +57,17 @@ def main(seeds: list[int]) -> None:
         imitation = params.imitation.model_copy(update={"cells": {name: cell}})
         changed = params.model_copy(update={"imitation": imitation})
         evaluate_method(name, changed, Method(ddpg.make_learner, make_reward), [paths.model(model)])
-        distances.append(pd.read_csv(paths.policies(name) / "runs.csv")["final_distance"].to_numpy())
-        report(f"seed {seed}", distances[-1])
-    report("all", np.concatenate(distances))
+        tables.append(pd.read_csv(paths.policies(name) / "runs.csv"))
+        report(f"seed {seed}", tables[-1])
+    report("all", pd.concat(tables))
 
 
-def report(name: str, distances: np.ndarray) -> None:
-    """Print how many of the runs end within 2 cm, by their final ``distances`` in metres."""
-    near = int((distances <= TOLERANCE).sum())
-    low, high = wilson_interval(near, len(distances))
-    within = f"{near} of {len(distances)} within 2 cm, {near / len(distances):.0%} [{low:.0%}, {high:.0%}]"
-    print(f"{name:8} {within}, median {100 * np.median(distances):.1f} cm", flush=True)
+def report(name: str, runs: pd.DataFrame) -> None:
+    """Print how many of the ``runs`` succeed, and their median distance."""
+    succeeded = int(runs["success"].sum())
+    low, high = wilson_interval(succeeded, len(runs))
+    rate = f"{succeeded} of {len(runs)} succeed, {succeeded / len(runs):.0%} [{low:.0%}, {high:.0%}]"
+    print(f"{name:8} {rate}, median {100 * runs['final_distance'].median():.1f} cm", flush=True)
 
 
 if __name__ == "__main__":
