@@ -10,7 +10,6 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from anyview.analysis import diversity, headline, replicates
-from anyview.analysis.estimates import Estimator
 from anyview.config import Params, load_params
 from anyview.paths import DATA
 from anyview.report.figures import diversity as diversity_figures
@@ -31,17 +30,19 @@ class Part(NamedTuple):
     page: dict[str, Any]
 
 
-def losses(params: Params, estimator: Estimator) -> Part | None:
+def losses(params: Params) -> Part | None:
     """Figure 20: every loss and reward of which all seeds were run."""
     runs, curves = replicates.read_replicates(params)
     if runs.empty:
         return None
-    steps = params.imitation.episodes_per_iteration * ACTIONS
+    steps, budget = params.imitation.episodes_per_iteration * ACTIONS, params.evidence.losses
     tables = {
-        "rates": replicates.rates(runs, estimator),
-        "ablations": replicates.ablations(runs, estimator),
-        "claims": replicates.claims(curves, estimator, steps),
+        "rates": replicates.rates(runs),
+        "ablations": replicates.ablations(runs),
+        "claims": replicates.claims(curves, steps),
         "learning": replicates.learning(curves, steps),
+        "shares": replicates.shares(runs, budget.every_reward),
+        "shared": replicates.rates(runs[runs["seed"].isin(budget.others.seeds)]),
     }
     figures = {
         "success": losses_figures.success(tables["rates"]),
@@ -57,35 +58,36 @@ def losses(params: Params, estimator: Estimator) -> Part | None:
     return Part(tables, figures, page)
 
 
-def diverse(params: Params, estimator: Estimator) -> Part | None:
+def diverse(params: Params) -> Part | None:
     """How much diversity: whatever was evaluated."""
     runs = diversity.read_diversity(params)
     if runs.empty:
         return None
+    levels = diversity.levels(params)
     tables = {
-        "rates": diversity.rates(runs, estimator),
-        "effects": diversity.effects(runs, diversity.levels(params), estimator),
-        "angles": diversity.angles(runs),
+        "rates": diversity.rates(runs),
+        "effects": diversity.effects(runs, levels),
+        "angles": diversity.angles(runs, levels),
     }
-    imitation, enough = params.imitation, diversity.enough(tables["effects"])
+    imitation = params.imitation
     page = {
         "steps": imitation.iterations * imitation.episodes_per_iteration * ACTIONS,
-        "enough": [
-            (name, list(rows.itertuples())) for name, rows in enough.groupby("evaluation", sort=False)
-        ],
+        "enough": list(diversity.enough(tables["effects"]).itertuples()),
         "evaluated": int(tables["rates"]["translators"].sum()),
         "planned": diversity.planned(params),
     }
-    figures = {"diversity": diversity_figures.diversity(tables["rates"], tables["angles"])}
+    figures = {"views": diversity_figures.by_views(tables["rates"])}
+    if not tables["angles"].empty:
+        figures["angles"] = diversity_figures.by_angle(tables["angles"])
     return Part(tables, figures, page)
 
 
-def main_methods(params: Params, estimator: Estimator) -> Part | None:
+def main_methods(params: Params) -> Part | None:
     """The main methods of which all seeds were run."""
     runs = headline.read_headline(params)
     if runs.empty:
         return None
-    tables = {"rates": headline.rates(runs, estimator), "contrasts": headline.against_ours(runs, estimator)}
+    tables = {"rates": headline.rates(runs), "contrasts": headline.against_ours(runs)}
     budget = params.evidence.headline
     return Part(tables, {}, {"steps": budget.iterations * budget.episodes_per_iteration * ACTIONS})
 
@@ -94,9 +96,8 @@ def main(arguments: list[str]) -> None:
     """Report on every part of which something was run."""
     refuse_arguments(arguments, "python report.py")
     params = load_params()
-    estimator = Estimator(params.base.seed)
     found = {"losses": losses, "diversity": diverse, "headline": main_methods}
-    parts = {name: part for name, read in found.items() if (part := read(params, estimator))}
+    parts = {name: part for name, read in found.items() if (part := read(params))}
     if not parts:
         raise AnyviewError(f"{DATA}: nothing of the evidence is evaluated yet, or not with all of its seeds")
     with whole_folder(RESULTS) as results:

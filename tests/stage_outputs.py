@@ -110,7 +110,9 @@ class Data:
             pair = np.concatenate([clip(frames, 0, 0), clip(frames, 1, index % 3)], axis=2)
             write_video(folder / "clips" / f"{name}.avi", pair, 10.0)
 
-    def policies(self, cell: str, distance: float, returns: bool = True, blind: bool = False) -> None:
+    def policies(
+        self, cell: str, distance: float, returns: bool = True, blind: bool = False, last: int = 240
+    ) -> None:
         folder = self._folder("policies", cell)
         context = np.linspace(-0.03, 0.03, RUNS)
         distances = np.clip(distance + context + self.rng.normal(0, 0.008, RUNS), 0.003, None)
@@ -125,7 +127,7 @@ class Data:
         self._csv(folder / "runs.csv", **runs)
         rows = []
         for run in range(RUNS):
-            for iteration in range(0, 250, 10):
+            for iteration in range(0, last + 10, 10):
                 left = distances[run] + 0.5 * np.exp(-iteration / 60) + self.rng.normal(0, 0.01)
                 gained = self.rng.normal() if blind else -100 * left
                 rows.append({"iteration": iteration, "run": run, "final_distance": left, "return": gained})

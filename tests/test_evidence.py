@@ -89,10 +89,8 @@ def test_a_translator_of_one_view_is_evaluated_in_it_and_reported(evidence):
     split = pd.read_csv(evidence.folder / "data/splits/diverse.csv").set_index("clip")["split"]
     assert set(split[shown]) == {"validation"}
     evidence.run("python", "report.py")
-    angles = pd.read_csv(evidence.folder / "results/diversity/angles.csv")
-    assert angles[["least", "most", "angle"]].values.tolist() == [[0, 11.25, 0]]
     page = (evidence.folder / "results/diversity/results.md").read_text()
-    assert "1 of 24 evaluations are there" in page
+    assert "1 of 16 evaluations are there" in page
     assert "No two cells can be compared yet" in page
 
 
@@ -149,20 +147,22 @@ def test_every_part_has_a_page_with_its_verdicts(tmp_path):
     evidence, data = load_params(ROOT / "params.yaml").evidence, Data(tmp_path)
     for name, metres in (("sim", 0.03), ("sim-no-translation", 0.4), ("sim-no-alignment", 0.03)):
         for seed in evidence.losses.seeds:
-            data.policies(paths.replicate(name, seed, "raw"), metres)
+            for reward in evidence.losses.rewards:
+                data.policies(paths.replicate(name, seed, reward), metres, last=150)
     for views, clutter in product((1, 4, "any"), paths.CLUTTER):
         name = paths.restricted_set(str(views), clutter)
         apart = 360 if views == "any" else views
         write_set(tmp_path, name, 2 * np.pi * (np.arange(4000) % apart) / apart)
         for seed, count in product(evidence.diversity.seeds, (250, 4000)):
-            policies = paths.replicate(f"{name}-{count}", seed, "contexts")
-            data.policies(policies, 0.3 if views == 1 else 0.03)
+            policies = paths.replicate(f"{name}-{count}", seed, "diverse")
+            data.policies(policies, 0.3 if views == 1 else 0.03, last=150)
             contexts = [{"azimuth": azimuth} for azimuth in np.linspace(0, np.pi, 15)]
             (tmp_path / paths.policies(policies) / "policy.json").write_text(
                 json.dumps({"contexts": contexts})
             )
     for name, seed in product(("ours", "oracle"), evidence.headline.seeds):
-        data.policies(paths.replicate(paths.headline(name), seed), {"ours": 0.03, "oracle": 0.01}[name])
+        metres = {"ours": 0.03, "oracle": 0.01}[name]
+        data.policies(paths.replicate(paths.headline(name), seed), metres, last=250)
 
     done = report(tmp_path)
     assert done.returncode == 0, done.stderr
@@ -170,12 +170,12 @@ def test_every_part_has_a_page_with_its_verdicts(tmp_path):
     assert set(pages) == {"losses", "diversity", "headline"}
     assert "| without L_tr | -33.3% | raw | supported | supported | supported |" in pages["losses"]
     assert "| without L_align | -6.67% | raw | open | open | open |" in pages["losses"]
-    assert (
-        "- **Any context**: viewpoints: more help up to 4; distractors: no step is seen to help."
-        in pages["diversity"]
-    )
-    assert "24 of 144 evaluations are there" in pages["diversity"]
-    assert "| Any context | 1 | 135 to 180 |" in pages["diversity"]
+    shares = pd.read_csv(tmp_path / "results/losses/shares.csv").set_index(["reward", "cell"])["share"]
+    assert shares["raw", "no-alignment"] == pytest.approx(0.5, rel=0.02)  # both rewards are invented alike
+    assert "- viewpoints: from 4 on none is seen to be worse than any." in pages["diversity"]
+    assert "- distractors: from plain on none is seen to be worse than distractors." in pages["diversity"]
+    assert "24 of 96 evaluations are there" in pages["diversity"]
+    assert "| 1 | 135 to 180 | 4 | 32 |" in pages["diversity"]
     assert "| Oracle (true view) | 0." in pages["headline"]
     for part, text in pages.items():
         assert "nan" not in text.lower(), part

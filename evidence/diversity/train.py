@@ -7,6 +7,7 @@ from anyview import paths
 from anyview.config import load_params
 from anyview.diversity.sets import first_demonstrations
 from anyview.runtime.errors import choose_each, run_stage
+from anyview.seeds import torch_seed
 from anyview.training.common.fit import fit
 from anyview.training.translator import TranslatorObjective
 from anyview.video.datasets import open_dataset
@@ -31,9 +32,9 @@ def main(arguments: list[str]) -> None:
         update={"dataset": dataset, "iterations": diversity.iterations}
     )
     clips = first_demonstrations(open_dataset(dataset), int(demonstrations))
-    # One seed is the same first weights and the same draws for every cell: they differ in their clips.
-    objective = TranslatorObjective(cell, params.training, int(seed), clips)
     name = paths.replicate(f"{dataset}-{demonstrations}", int(seed))
+    # Weights and draws of its own: the luck of a seed is then no part of what two cells have in common.
+    objective = TranslatorObjective(cell, params.training, torch_seed(int(seed), name), clips)
     fit(name, objective, paths.model(name))
 
 

@@ -13,7 +13,7 @@ RENDERED = "rendered"  # the set that stage render makes; the others are simulat
 
 ANY_VIEW = "any"  # of the sets that evidence restricts: seen from anywhere, as the set that they show
 CLUTTER = ("plain", "distractors")
-EVALUATIONS = ("own", "contexts", "diverse")  # of their translators: see evidence/dvc.yaml
+EVALUATIONS = ("own", "diverse")  # of their translators: see evidence/dvc.yaml
 
 
 def raw(source: str) -> Path:

@@ -6,10 +6,7 @@ import pytest
 from scipy import stats
 
 from anyview import paths
-from anyview.analysis.estimates import Estimator
 from anyview.analysis.headline import against_ours, rates, read_headline
-
-ESTIMATOR = Estimator(1)
 
 
 def runs_of(**metres: list[float]) -> pd.DataFrame:
@@ -26,8 +23,8 @@ def runs_of(**metres: list[float]) -> pd.DataFrame:
 
 
 def test_models_that_all_end_nearer_do_so_and_the_test_is_over_contexts():
-    runs = runs_of(ours=[0.01, 0.02, 0.03], oracle=[0.005, 0.01, 0.015], tcn=[0.005, 0.01, 0.3])
-    table = against_ours(runs, ESTIMATOR).set_index("cell")
+    runs = runs_of(ours=[0.01, 0.02, 0.03], oracle=[0.005, 0.0105, 0.0145], tcn=[0.005, 0.01, 0.3])
+    table = against_ours(runs).set_index("cell")
     assert table.loc["oracle", ["farther", "models"]].tolist() == [0, 3]
     assert table["farther"]["tcn"] == 1
     assert table["ratio"]["oracle"] == pytest.approx(0.5, rel=0.2)
@@ -43,19 +40,20 @@ def test_models_that_all_end_nearer_do_so_and_the_test_is_over_contexts():
 
 def test_without_ours_there_is_nothing_to_compare_with():
     runs = runs_of(oracle=[0.01, 0.02])
-    assert against_ours(runs, ESTIMATOR).empty
-    assert list(rates(runs, ESTIMATOR)["translators"]) == [2]
+    assert against_ours(runs).empty
+    assert list(rates(runs)["translators"]) == [2]
 
 
 def test_only_what_has_all_of_its_seeds_is_read(data, params):
-    seeds = params.evidence.headline.seeds
+    headline = params.evidence.headline
+    seeds, last = headline.seeds, headline.iterations
     for seed in seeds:
-        data.policies(paths.replicate(paths.headline("ours"), seed), 0.03)
-    data.policies(paths.replicate(paths.headline("liu"), seeds[0]), 0.3)
+        data.policies(paths.replicate(paths.headline("ours"), seed), 0.03, last=last)
+    data.policies(paths.replicate(paths.headline("liu"), seeds[0]), 0.3, last=last)
     runs = read_headline(params, data.root)
     assert set(runs["cell"]) == {"ours"}
     assert len(runs) == 15 * len(seeds)
-    (row,) = rates(runs, ESTIMATOR).itertuples()
+    (row,) = rates(runs).itertuples()
     assert row.thesis == 0.8
 
 

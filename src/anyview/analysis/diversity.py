@@ -4,7 +4,7 @@ import json
 import math
 from collections.abc import Iterator
 from functools import cache, partial
-from itertools import pairwise, product
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +12,8 @@ import pandas as pd
 
 from anyview import paths
 from anyview.analysis.comparisons import ENOUGH_RUNS, claimed, log_distance
-from anyview.analysis.estimates import Estimator
-from anyview.analysis.replicates import CONTRAST, by_context, contrast, corrected, rate, stacked
+from anyview.analysis.replicates import CONTRAST, by_context, contrast, corrected, rate, read_whole, stacked
 from anyview.analysis.statistics import sign_flip_test
-from anyview.analysis.study import read_method
 from anyview.config import Params
 from anyview.runtime.errors import AnyviewError
 from anyview.video.manifests import read_table
@@ -23,6 +21,9 @@ from anyview.video.splits import read_split
 
 FACTORS = ("views", "clutter", "demonstrations")
 _COLUMNS = ["evaluation", *FACTORS, "seed", "run", "success", "final_distance", "angle"]
+
+ANYWHERE = "diverse"
+"""The evaluation in any context by any clip: contexts are the same for all translators."""
 
 ANGLES = (0.0, 11.25, 22.5, 45.0, 90.0, 135.0, 180.0)
 """Bounds of classes of angles in degrees. The first are as far as a context can be from 16, 8 and 4 views."""
@@ -46,7 +47,7 @@ def read_diversity(params: Params, root: Path = Path()) -> pd.DataFrame:
         folder = root / paths.policies(name)
         if not folder.exists():
             continue
-        runs = read_method(folder).runs
+        runs = read_whole(folder, params.imitation.iterations).runs
         angles = nearest(_acting(folder), trained_on(dataset, int(demonstrations)))
         keys = dict(zip(_COLUMNS, (evaluation, views, clutter, demonstrations, seed), strict=False))
         tables.append(runs.assign(**keys, angle=angles[runs["run"].astype(int)])[_COLUMNS])
@@ -59,11 +60,11 @@ def nearest(azimuths: np.ndarray, views: np.ndarray) -> np.ndarray:
     return np.degrees(np.minimum(away, 2 * np.pi - away).min(axis=1))
 
 
-def rates(runs: pd.DataFrame, estimator: Estimator) -> pd.DataFrame:
+def rates(runs: pd.DataFrame) -> pd.DataFrame:
     """Each cell: ``evaluation, views, clutter, demonstrations``, then as ``replicates.rate`` has it."""
     rows = []
     for key, table in runs.groupby(["evaluation", *FACTORS], sort=False):
-        found = rate(f"diversity/{key}", *by_context(table), estimator)
+        found = rate(*by_context(table))
         rows.append(dict(zip(["evaluation", *FACTORS], key, strict=True)) | dict(found))
     return pd.DataFrame(rows)
 
@@ -84,84 +85,87 @@ def levels(params: Params) -> dict[str, list[str]]:
     return dict(zip(FACTORS, (views, [*paths.CLUTTER], [*map(str, diversity.demonstrations)]), strict=True))
 
 
-def effects(runs: pd.DataFrame, levels: dict[str, list[str]], estimator: Estimator) -> pd.DataFrame:
-    """What the next of the ``levels`` of a factor changes, over all cells that differ in this factor alone.
+def effects(runs: pd.DataFrame, levels: dict[str, list[str]]) -> pd.DataFrame:
+    """What each level of a factor lacks that the most diverse has: cells that differ in this factor alone.
 
-    ``evaluation, factor, before, after``; ``pairs`` of translators; as ``replicates.contrast`` has it, of the
-    level after; ``p``: sign-flip test of the pairs' mean log ratios, corrected for all rows but those of
-    ``few`` pairs, which have none; ``claim``: more diversity ``helps``, ``harms``, or it is ``open``;
-    ``few``: fewer than ``ENOUGH_RUNS`` pairs.
+    Of runs in any context, the same ones at every level. ``factor, level, most``; ``pairs`` of translators;
+    as ``replicates.contrast`` has it, of the level against the most diverse; ``p``: sign-flip test of the
+    pairs' mean log ratios, corrected for all rows but those of ``few`` pairs, which have none; ``claim``:
+    less diversity is ``worse``, ``better``, or it is ``open``; ``few``: fewer than ``ENOUGH_RUNS`` pairs.
     """
     rows = []
-    for evaluation, table in runs.groupby("evaluation", sort=False):
-        for factor, before, after, success, logs in _steps(table, levels):
-            rows.append(
-                {
-                    "evaluation": evaluation,
-                    "factor": factor,
-                    "before": before,
-                    "after": after,
-                    "pairs": len(logs),
-                    **contrast(f"diversity/{evaluation}/{factor}/{after}", success, logs, estimator),
-                    "p": sign_flip_test(logs.mean(axis=1)),
-                }
-            )
-    table = pd.DataFrame(rows, columns=["evaluation", "factor", "before", "after", "pairs", *CONTRAST, "p"])
-    table["p"] = corrected(table["p"], table["pairs"] >= ENOUGH_RUNS)
-    return table.assign(claim=claimed(table, "pairs", "helps", "harms"))
+    for factor, level, most, success, logs in _pairs(runs[runs["evaluation"] == ANYWHERE], levels):
+        keys = {"factor": factor, "level": level, "most": most, "pairs": len(logs)}
+        rows.append({**keys, **contrast(success, logs), "p": sign_flip_test(logs.mean(axis=1))})
+    table = pd.DataFrame(rows, columns=["factor", "level", "most", "pairs", *CONTRAST, "p"])
+    table.loc[table["pairs"] < ENOUGH_RUNS, "p"] = np.nan
+    table["p"] = corrected(table["p"])
+    return table.assign(claim=claimed(table, "pairs", "better", "worse"))
 
 
 def enough(effects: pd.DataFrame) -> pd.DataFrame:
-    """Up to which level of each factor more of it helps: ``evaluation, factor, level, settled``.
+    """How much of each factor is seen to be needed: ``factor, level, most``.
 
-    ``level`` is empty where no step helps. ``settled``: no later step has too few pairs to tell.
+    The first level from which on none is worse than the most diverse; empty where a later one has too few
+    pairs to tell.
     """
     rows = []
-    for (evaluation, factor), steps in effects.groupby(["evaluation", "factor"], sort=False):
-        helps = np.flatnonzero(steps["claim"] == "helps")
-        later = steps[helps[-1] + 1 if len(helps) else 0 :]
-        level = steps["after"].iloc[helps[-1]] if len(helps) else ""
-        rows.append((evaluation, factor, level, not (later["claim"] == "few").any()))
-    return pd.DataFrame(rows, columns=["evaluation", "factor", "level", "settled"])
+    for factor, levels in effects.groupby("factor", sort=False):
+        falling = np.flatnonzero(levels["claim"].isin(["worse", "few"]))
+        most = levels["most"].iloc[0]
+        after = [*levels["level"], most][falling[-1] + 1 if len(falling) else 0]
+        rows.append((factor, "" if (levels["claim"] == "few").any() else after, most))
+    return pd.DataFrame(rows, columns=["factor", "level", "most"])
 
 
-def angles(runs: pd.DataFrame) -> pd.DataFrame:
-    """How runs end by the angle to the nearest viewpoint of the training: each class that has runs.
+def angles(runs: pd.DataFrame, levels: dict[str, list[str]]) -> pd.DataFrame:
+    """How runs in any context end by the angle to the nearest viewpoint of the training: a row a class.
 
-    ``evaluation, views, least, most`` (degrees), ``angle`` (their mean), ``runs``; ``success``, the share
-    that succeeds; ``distance``, the geometric mean of the final ones in metres.
+    ``views, least, most`` (degrees), ``angle`` (their mean), ``runs``, ``contexts`` that they are in;
+    ``success``, the share that succeeds; ``distance``, the geometric mean of the final ones in metres;
+    ``ratio``, how many times as far as with the most viewpoints in these very contexts, NaN where that was
+    not run: some contexts are harder than others. Classes without runs have no row.
     """
-    classes = np.digitize(runs["angle"].to_numpy(float), ANGLES[1:-1], right=True)
+    runs = runs[runs["evaluation"] == ANYWHERE]
+    logs = runs.assign(log=log_distance(runs["final_distance"]))
+    keys = ["clutter", "demonstrations", "seed", "run"]
+    most = logs.loc[logs["views"] == levels["views"][-1], [*keys, "log"]]
+    logs = logs.merge(most, on=keys, how="left", suffixes=("", "_most"))
+    classes = np.digitize(logs["angle"].to_numpy(float), ANGLES[1:-1], right=True)
     rows = []
-    for (evaluation, views, index), table in runs.assign(index=classes).groupby(
-        ["evaluation", "views", "index"], sort=False
-    ):
-        distance = np.exp(log_distance(table["final_distance"]).mean())
+    for (views, index), table in logs.assign(index=classes).groupby(["views", "index"], sort=False):
         bounds = (ANGLES[index], ANGLES[index + 1], table["angle"].mean())
-        rows.append((evaluation, views, *bounds, len(table), table["success"].mean(), distance))
-    names = ["evaluation", "views", "least", "most", "angle", "runs", "success", "distance"]
+        counts = (len(table), table["run"].nunique(), table["success"].mean())
+        ends = (np.exp(table["log"].mean()), np.exp((table["log"] - table["log_most"]).mean()))
+        rows.append((views, *bounds, *counts, *ends))
+    names = ["views", "least", "most", "angle", "runs", "contexts", "success", "distance", "ratio"]
     table = pd.DataFrame(rows, columns=names)
-    order = table["views"].map({views: place for place, views in enumerate(runs["views"].unique())})
-    return table.assign(order=order).sort_values(["evaluation", "order", "least"]).drop(columns="order")
+    order = table["views"].map(levels["views"].index)
+    return table.assign(order=order).sort_values(["order", "least"]).drop(columns="order")
 
 
-def _steps(
+def _pairs(
     runs: pd.DataFrame, levels: dict[str, list[str]]
 ) -> Iterator[tuple[str, str, str, np.ndarray, np.ndarray]]:
-    """Factor, level before and after; differences of successes and of logs, (pairs, contexts)."""
-    for factor, ordered in levels.items():
+    """Factor, a level and the most diverse; differences of successes and of logs, (pairs, contexts)."""
+    for factor, (*less, most) in levels.items():
         others = [name for name in (*FACTORS, "seed") if name != factor]
-        for before, after in pairwise(ordered):
-            wide = [
-                runs[runs[factor] == level].pivot(index=others, columns="run") for level in (before, after)
-            ]
-            shared = wide[0].index.intersection(wide[1].index)
+        wide = {
+            level: runs[runs[factor] == level].pivot(index=others, columns="run") for level in (*less, most)
+        }
+        for level in less:
+            shared = wide[level].index.intersection(wide[most].index)
             if not len(shared):
                 continue
-            first, second = (table.loc[shared] for table in wide)
-            success = second["success"].to_numpy(float) - first["success"].to_numpy(float)
-            logs = log_distance(second["final_distance"]) - log_distance(first["final_distance"])
-            yield factor, before, after, success, logs
+            here, there = wide[level].loc[shared], wide[most].loc[shared]
+            success = here["success"].to_numpy(float) - there["success"].to_numpy(float)
+            yield (
+                factor,
+                level,
+                most,
+                success,
+                log_distance(here["final_distance"]) - log_distance(there["final_distance"]),
+            )
 
 
 def _acting(folder: Path) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Estimates with their 95% bounds, resampled from named streams, so that they repeat exactly."""
+"""Estimates with their 95% bounds; what is resampled is so from named streams, so that it repeats exactly."""
 
 import math
 from collections.abc import Iterable
@@ -9,8 +9,9 @@ import pandas as pd
 
 from anyview.analysis import thesis
 from anyview.analysis.statistics import (
-    RESAMPLES,
     bootstrap_interval,
+    crossed_interval,
+    crossed_rate_interval,
     quantile_interval,
     resampled,
     wilson_interval,
@@ -41,19 +42,6 @@ class Estimator:
         """Mean of ``values`` (n,); those of one group (``groups``: (n,)) are drawn together."""
         sums = _sums(values, groups)
         return Estimate(float(np.mean(values)), *bootstrap_interval(sums, _ratio_of_sums, self._stream(name)))
-
-    def crossed_mean(self, name: str, values: np.ndarray) -> Estimate:
-        """Mean of ``values`` (K, n) of K translators in the same n contexts.
-
-        Translators are drawn, and then the contexts for all of these at once (Owen 2007): what a context does
-        to every translator, and what a translator does in every context, are drawn once.
-        """
-        rng = self._stream(name)
-        translators, contexts = (
-            rng.multinomial(count, np.full(count, 1 / count), RESAMPLES) / count for count in values.shape
-        )
-        draws = np.einsum("bk,kn,bn->b", translators, values, contexts, optimize=True)
-        return Estimate(float(values.mean()), *quantile_interval(draws))
 
     def median(self, name: str, values: np.ndarray) -> Estimate:
         """Median of ``values`` (n,)."""
@@ -104,6 +92,16 @@ class Estimator:
 def proportion(successes: int, trials: int) -> Estimate:
     """Successes of trials, with Wilson bounds."""
     return Estimate(successes / trials, *wilson_interval(successes, trials))
+
+
+def crossed_mean(values: np.ndarray) -> Estimate:
+    """Mean of ``values`` (K, n) of K models in the same n contexts, both of which are draws."""
+    return Estimate(float(values.mean()), *crossed_interval(values))
+
+
+def crossed_rate(successes: np.ndarray) -> Estimate:
+    """Rate of ``successes`` (K, n) of K models in the same n contexts, both of which are draws."""
+    return Estimate(float(successes.mean()), *crossed_rate_interval(successes))
 
 
 def without_interval(value: float) -> Estimate:

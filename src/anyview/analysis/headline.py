@@ -8,10 +8,8 @@ import pandas as pd
 from anyview import paths
 from anyview.analysis import thesis
 from anyview.analysis.cells import OURS
-from anyview.analysis.estimates import Estimator
-from anyview.analysis.replicates import CONTRAST, by_context, contrast, rate, stacked
+from anyview.analysis.replicates import CONTRAST, by_context, contrast, rate, read_whole, stacked
 from anyview.analysis.statistics import holm, sign_flip_test
-from anyview.analysis.study import read_method
 from anyview.config import Params
 
 
@@ -29,28 +27,29 @@ def read_headline(params: Params, root: Path = Path()) -> pd.DataFrame:
         }
         if all(folder.exists() for folder in folders.values()):
             runs += [
-                read_method(folder).runs[["run", "success", "final_distance"]].assign(cell=cell, seed=seed)
+                read_whole(folder, headline.iterations)
+                .runs[["run", "success", "final_distance"]]
+                .assign(cell=cell, seed=seed)
                 for seed, folder in folders.items()
             ]
     return stacked(runs)
 
 
-def rates(runs: pd.DataFrame, estimator: Estimator) -> pd.DataFrame:
+def rates(runs: pd.DataFrame) -> pd.DataFrame:
     """Each method: ``cell``, then as ``replicates.rate`` has it, and the success rate of the ``thesis``."""
     rows = []
     for cell, table in runs.groupby("cell", sort=False):
         published = thesis.SUCCESSES.get(str(cell), np.nan) / thesis.RUNS
-        found = rate(f"headline/{cell}", *by_context(table), estimator)
-        rows.append({"cell": cell, **found, "thesis": published})
+        rows.append({"cell": cell, **rate(*by_context(table)), "thesis": published})
     return pd.DataFrame(rows)
 
 
-def against_ours(runs: pd.DataFrame, estimator: Estimator) -> pd.DataFrame:
+def against_ours(runs: pd.DataFrame) -> pd.DataFrame:
     """Every other method against `ours`, model by model of one seed, in the same contexts.
 
     ``cell``, then as ``replicates.contrast`` has it; ``farther``: models with which the object ends farther
     away; ``p``: sign-flip test over contexts of the mean log ratio of these models, corrected for all rows.
-    It says nothing of other models: of these there are too few to test, and the intervals draw them.
+    It says nothing of other models, of which there are too few to test; the intervals are of those too.
     """
     tables = {cell: by_context(table) for cell, table in runs.groupby("cell", sort=False)}
     rows = []
@@ -63,7 +62,7 @@ def against_ours(runs: pd.DataFrame, estimator: Estimator) -> pd.DataFrame:
             {
                 "cell": cell,
                 "models": len(logs),
-                **contrast(f"headline/{cell}", success - our_success, differences, estimator),
+                **contrast(success - our_success, differences),
                 "farther": (differences.mean(axis=1) > 0).sum(),
                 "p": sign_flip_test(differences.mean(axis=0)),
             }

@@ -11,10 +11,11 @@ from anyview import paths
 from anyview.analysis import thesis
 from anyview.analysis.cells import OURS, ablation
 from anyview.analysis.comparisons import SIGNIFICANT, TOLERANCE, log_distance
-from anyview.analysis.estimates import Estimator
+from anyview.analysis.estimates import crossed_mean, crossed_rate
 from anyview.analysis.statistics import exchange_test, holm
-from anyview.analysis.study import read_method
-from anyview.config import Params
+from anyview.analysis.study import EvaluatedMethod, read_method
+from anyview.config import Params, RewardWeights
+from anyview.runtime.errors import AnyviewError
 
 ENOUGH_TRANSLATORS = 4
 """With fewer of a kind, not even a test of translators that all agree would reach 5%."""
@@ -26,8 +27,8 @@ BUDGETS = (1 / 4, 1 / 2, 1)
 def read_replicates(params: Params, root: Path = Path()) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Runs and learning curves below ``root``, of the translators and rewards whose seeds are all there.
 
-    Runs: ``reward, cell, seed, run, success, final_distance``; a ``cell`` is the method that the translator
-    makes of `ours`. Curves: ``reward, cell, seed, run, iteration, final_distance``.
+    Runs: ``reward, cell, seed, run, success, final_distance, return_still``; a ``cell`` is the method that
+    the translator makes of `ours`. Curves: ``reward, cell, seed, run, iteration, final_distance``.
     """
     losses = params.evidence.losses
     runs, curves = [], []
@@ -38,16 +39,24 @@ def read_replicates(params: Params, root: Path = Path()) -> tuple[pd.DataFrame, 
                 for seed in losses.seeds_under(reward)
             }
             for seed, folder in folders.items() if all(map(Path.exists, folders.values())) else ():
-                method, keys = (
-                    read_method(folder),
-                    {"reward": reward, "cell": ablation(translator), "seed": seed},
-                )
-                runs.append(method.runs[["run", "success", "final_distance"]].assign(**keys))
+                method = read_whole(folder, params.imitation.iterations)
+                keys = {"reward": reward, "cell": ablation(translator), "seed": seed}
+                columns = ["run", "success", "final_distance", "return_still"]
+                runs.append(method.runs[columns].assign(**keys))
                 curves.append(method.curve[["run", "iteration", "final_distance"]].assign(**keys))
     return stacked(runs), stacked(curves)
 
 
-def rates(runs: pd.DataFrame, estimator: Estimator) -> pd.DataFrame:
+def read_whole(folder: Path, iterations: int) -> EvaluatedMethod:
+    """The method in ``folder``; AnyviewError unless its policies learned for so many ``iterations``."""
+    method = read_method(folder)
+    if (learned := int(method.curve["iteration"].max())) != iterations:
+        says = f"its policies learned for {learned} iterations, where params.yaml says {iterations}"
+        raise AnyviewError(f"{folder}: {says}: run its stage again")
+    return method
+
+
+def rates(runs: pd.DataFrame) -> pd.DataFrame:
     """Each cell under each reward, over its translators and the contexts.
 
     ``reward, cell``, then as ``rate`` has it, and the success rate of the ``thesis``.
@@ -55,18 +64,36 @@ def rates(runs: pd.DataFrame, estimator: Estimator) -> pd.DataFrame:
     rows = []
     for reward, cell, success, logs in _tables(runs):
         published = thesis.SUCCESSES.get(cell, np.nan) / thesis.RUNS
-        found = rate(f"{reward}/{cell}", success, logs, estimator)
-        rows.append({"reward": reward, "cell": cell, **found, "thesis": published})
+        rows.append({"reward": reward, "cell": cell, **rate(success, logs), "thesis": published})
     return pd.DataFrame(rows)
 
 
-def ablations(runs: pd.DataFrame, estimator: Estimator) -> pd.DataFrame:
+def shares(runs: pd.DataFrame, rewards: Mapping[str, RewardWeights]) -> pd.DataFrame:
+    """How much of a raw reward is L_f, by what standing still costs: ``reward, cell, share``.
+
+    Of the raw among the ``rewards``, where runs of one that is not raw tell the cost of L_f: standing still
+    earns -T u_f (w_f + w_i) / w_f there, on the equations' scale, and -T (u_f + phi u_i) under a raw one.
+    Shares are medians over translators and contexts.
+    """
+    still = runs.pivot(index=["cell", "seed", "run"], columns="reward", values="return_still")
+    told = [name for name in still if not rewards[name].raw and rewards[name].feature]
+    rows = []
+    for name in still if told else ():
+        if rewards[name].raw and rewards[name].feature:
+            weights = rewards[told[0]]
+            features = still[told[0]] * weights.feature / (weights.feature + weights.image)
+            found = (features / still[name]).dropna().groupby("cell", sort=False).median()
+            rows += [(name, cell, share) for cell, share in found.items()]
+    return pd.DataFrame(rows, columns=["reward", "cell", "share"])
+
+
+def ablations(runs: pd.DataFrame) -> pd.DataFrame:
     """Each ablation against `ours` under the same reward.
 
     ``reward, cell, translators``, then as ``contrast`` has it; ``thesis``: its difference of success rates;
     ``p``: exact test that exchanges the two cells' translators, of their mean log distances, corrected for
-    all rows but those of ``few`` translators, which have none; ``claim``, that the loss helps: ``supported``,
-    ``refuted`` (it harms), ``open`` or ``few``.
+    the rows of one reward; those of ``few`` translators have none; ``claim``, that the loss helps:
+    ``supported``, ``refuted`` (it harms), ``open`` or ``few``.
     """
     tables = {(reward, cell): values for reward, cell, *values in _tables(runs)}
     rows = []
@@ -79,17 +106,18 @@ def ablations(runs: pd.DataFrame, estimator: Estimator) -> pd.DataFrame:
                 "reward": reward,
                 "cell": cell,
                 "translators": len(logs),
-                **contrast(f"{reward}/{cell}", success - our_success, logs - our_logs, estimator),
+                **contrast(success - our_success, logs - our_logs),
                 "thesis": (thesis.SUCCESSES.get(cell, np.nan) - thesis.SUCCESSES[OURS]) / thesis.RUNS,
                 "p": exchange_test(logs.mean(axis=1), our_logs.mean(axis=1)),
             }
         )
     table = pd.DataFrame(rows, columns=["reward", "cell", "translators", *CONTRAST, "thesis", "p"])
-    table["p"] = corrected(table["p"], table["translators"] >= ENOUGH_TRANSLATORS)
+    table.loc[table["translators"] < ENOUGH_TRANSLATORS, "p"] = np.nan
+    table["p"] = table.groupby("reward")["p"].transform(corrected)
     return table.assign(claim=[_claim(row) for row in table.itertuples()])
 
 
-def claims(curves: pd.DataFrame, estimator: Estimator, steps: int) -> pd.DataFrame:
+def claims(curves: pd.DataFrame, steps: int) -> pd.DataFrame:
     """What can be said of each loss after the ``BUDGETS`` of environment steps: ``ablations``, and ``steps``.
 
     An iteration has ``steps`` of a run. The tests of each budget are corrected by themselves.
@@ -100,7 +128,7 @@ def claims(curves: pd.DataFrame, estimator: Estimator, steps: int) -> pd.DataFra
     for iteration in sorted(reached):
         runs = curves[curves["iteration"] == iteration]
         runs = runs.assign(success=runs["final_distance"] < TOLERANCE)
-        tables.append(ablations(runs, estimator).assign(steps=iteration * steps))
+        tables.append(ablations(runs).assign(steps=iteration * steps))
     return pd.concat(tables, ignore_index=True)
 
 
@@ -122,18 +150,18 @@ def learning(curves: pd.DataFrame, steps: int) -> pd.DataFrame:
     return np.exp(means).rename("final_distance").reset_index()
 
 
-CONTRAST = ("value", "low", "high", "ratio", "ratio_low", "ratio_high")
+CONTRAST = ("value", "ratio", "ratio_low", "ratio_high")
 
 
-def rate(name: str, success: np.ndarray, logs: np.ndarray, estimator: Estimator) -> Mapping[str, float]:
+def rate(success: np.ndarray, logs: np.ndarray) -> Mapping[str, float]:
     """Successes and log distances of one cell, both (translators, contexts).
 
     ``translators, contexts``; ``value, low, high`` of the success rate, ``fewest, most`` successes of one
-    translator; ``distance, distance_low, distance_high``: geometric mean of the final distances, in metres.
+    translator; ``distance, distance_low, distance_high``: geometric mean of the final distances, in metres;
+    ``nearest, farthest`` of one translator.
     """
-    found = estimator.crossed_mean(f"{name}/success", success)
-    distance = estimator.crossed_mean(f"{name}/distance", logs).exponential()
-    counts = success.sum(axis=1).astype(int)
+    found, distance = crossed_rate(success), crossed_mean(logs).exponential()
+    counts, of_translators = success.sum(axis=1).astype(int), np.exp(logs.mean(axis=1))
     return {
         "translators": success.shape[0],
         "contexts": success.shape[1],
@@ -145,25 +173,26 @@ def rate(name: str, success: np.ndarray, logs: np.ndarray, estimator: Estimator)
         "distance": distance.value,
         "distance_low": distance.low,
         "distance_high": distance.high,
+        "nearest": of_translators.min(),
+        "farthest": of_translators.max(),
     }
 
 
-def contrast(name: str, success: np.ndarray, logs: np.ndarray, estimator: Estimator) -> Mapping[str, float]:
+def contrast(success: np.ndarray, logs: np.ndarray) -> Mapping[str, float]:
     """Differences of successes and of log distances of two cells, both (translators, contexts).
 
-    ``value, low, high``: difference of success rates; ``ratio, ratio_low, ratio_high``: how many times as
-    far, as a geometric mean.
+    ``value``: difference of success rates; ``ratio, ratio_low, ratio_high``: how many times as far, as a
+    geometric mean.
     """
-    found = estimator.crossed_mean(f"{name}/success difference", success)
-    ratio = estimator.crossed_mean(f"{name}/ratio", logs).exponential()
-    values = (found.value, found.low, found.high, ratio.value, ratio.low, ratio.high)
+    ratio = crossed_mean(logs).exponential()
+    values = (float(success.mean()), ratio.value, ratio.low, ratio.high)
     return dict(zip(CONTRAST, values, strict=True))
 
 
-def corrected(p_values: pd.Series, enough: pd.Series) -> np.ndarray:
-    """Holm's correction of the ``p_values`` of which there are ``enough``; the others are not tested: NaN."""
-    found, tested = p_values.to_numpy(float, copy=True), enough.to_numpy(bool)
-    found[~tested] = np.nan
+def corrected(p_values: pd.Series) -> np.ndarray:
+    """Holm's correction of those ``p_values`` that are not NaN, which was not tested."""
+    found = p_values.to_numpy(float, copy=True)
+    tested = ~np.isnan(found)
     found[tested] = holm(found[tested])
     return found
 

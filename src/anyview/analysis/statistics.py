@@ -21,6 +21,48 @@ def wilson_interval(successes: int, trials: int) -> Interval:
     return float(result.low), float(result.high)
 
 
+def crossed_error(values: np.ndarray) -> tuple[float, float]:
+    """Standard error, and its degrees of freedom, of the mean of ``values`` (K, n) of K models in n contexts.
+
+    Contexts are the same for all models, and both are draws: the squared error is s_K^2/K + s_n^2/n -
+    s^2/(Kn), with the variances of models' means, of contexts' means and of what neither explains. The
+    degrees are Satterthwaite's (1946). With one model it is of the contexts alone.
+    """
+    models, contexts = values.shape
+    overall, of_models, of_contexts = values.mean(), values.mean(axis=1), values.mean(axis=0)
+    contexts_part, freedom = of_contexts.var(ddof=1) / contexts, contexts - 1.0
+    if models == 1:
+        return float(np.sqrt(contexts_part)), freedom
+    models_part = of_models.var(ddof=1) / models
+    unexplained = np.sum((values - of_models[:, None] - of_contexts + overall) ** 2) / freedom / (models - 1)
+    both = models_part + contexts_part
+    if both > 0:
+        freedom = both**2 / (models_part**2 / (models - 1) + contexts_part**2 / freedom)
+    # Both parts hold the unexplained one, which counts once; an estimate of it may be too large.
+    variance = max(both - unexplained / values.size, models_part, contexts_part)
+    return float(np.sqrt(variance)), float(freedom)
+
+
+def crossed_interval(values: np.ndarray) -> Interval:
+    """Student's interval of the mean of ``values`` (K, n), as ``crossed_error`` has its error."""
+    error, freedom = crossed_error(values)
+    reach = stats.t.ppf(0.975, freedom) * error
+    return float(values.mean() - reach), float(values.mean() + reach)
+
+
+def crossed_rate_interval(successes: np.ndarray) -> Interval:
+    """Wilson's interval of the rate of ``successes`` (K, n) of K models in the same n contexts.
+
+    Of as many trials as would have the error that ``crossed_error`` finds, as for clustered samples (Korn and
+    Graubard, 1998); of n where all succeed or none.
+    """
+    rate, (error, freedom) = float(successes.mean()), crossed_error(np.asarray(successes, float))
+    trials = min(rate * (1 - rate) / error**2, successes.size) if error > 0 else successes.shape[1]
+    z2 = stats.t.ppf(0.975, freedom) ** 2 / trials
+    centre, reach = rate + z2 / 2, np.sqrt(z2 * (rate * (1 - rate) + z2 / 4))
+    return float((centre - reach) / (1 + z2)), float((centre + reach) / (1 + z2))
+
+
 def resampled(values: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """``RESAMPLES`` draws with replacement of the rows of ``values`` (n, ...), as (RESAMPLES, n, ...)."""
     values = np.asarray(values)

@@ -7,46 +7,57 @@ from matplotlib.figure import Figure
 
 from anyview.report.figures.style import DASHES, PALETTE, QUIET, canvas
 
-TITLES = {
-    "own": "Contexts and clips as trained on",
-    "contexts": "Any context, clips as trained on",
-    "diverse": "Any context, any clip",
-}
+TITLES = {"own": "Contexts and clips as trained on", "diverse": "Any context, any clip"}
 
 
-def diversity(rates: pd.DataFrame, angles: pd.DataFrame) -> Figure:
-    """Final distance over viewpoints, a panel an evaluation; below it over the angle to the nearest one.
-
-    The angle counts where the context is any, and if possible the clips are as trained on.
-    """
+def by_views(rates: pd.DataFrame) -> Figure:
+    """Final distance over viewpoints, a panel an evaluation; bars reach from one translator to another."""
     evaluations = list(rates["evaluation"].unique())
-    in_any_context = [evaluation for evaluation in evaluations if evaluation != "own"][:1]
-    panels = len(evaluations) + len(in_any_context)
-    with canvas(2.1 * panels + 0.6, rows=panels, sharey=True) as (figure, axes):
-        views = list(rates["views"].unique())
-        for axis, evaluation in zip(axes, evaluations, strict=False):
+    views = list(rates["views"].unique())
+    with canvas(2.1 * len(evaluations) + 0.6, rows=len(evaluations), sharey=True) as (figure, axes):
+        for axis, evaluation in zip(axes, evaluations, strict=True):
             _by_views(axis, rates[rates["evaluation"] == evaluation], views)
-            axis.set_title(TITLES[evaluation])
-        axes[len(evaluations) - 1].set_xlabel("viewpoints of the translator's training")
-        axes[0].legend(fontsize=7.5, ncols=2)
-        for axis, evaluation in zip(axes[len(evaluations) :], in_any_context, strict=True):
-            _by_angle(axis, angles[angles["evaluation"] == evaluation])
-            axis.set_title(f"{TITLES[evaluation]}, by the angle")
-        for axis in axes:
-            axis.set(yscale="log", ylabel="final distance (cm)")
-            axis.yaxis.set_major_formatter("{x:g}")
-            axis.yaxis.set_minor_formatter("")
+            axis.set(title=TITLES[evaluation], yscale="log", ylabel="final distance (cm)")
+            _plain(axis)
             axis.axhline(2, color=QUIET, linewidth=0.8)
+        axes[-1].set_xlabel("viewpoints of the translator's training")
+        axes[0].legend(fontsize=7.5, ncols=2)
         return figure
 
 
+def by_angle(angles: pd.DataFrame) -> Figure:
+    """How many times as far as with the most viewpoints in the same contexts, by the nearest one's angle."""
+    with canvas(2.6) as (figure, (axis,)):
+        for place, (views, rows) in enumerate(angles.groupby("views", sort=False)):
+            axis.plot(
+                rows["angle"],
+                rows["ratio"],
+                color=PALETTE[place % len(PALETTE)],
+                marker="o",
+                markersize=3,
+                label=f"{views} view" if views in ("1", "any") else f"{views} views",
+            )
+        axis.set(yscale="log", ylabel="times as far")
+        _plain(axis)
+        axis.axhline(1, color=QUIET, linewidth=0.8)
+        axis.set_xticks(range(0, 181, 45))
+        axis.set_xlabel("degrees from the agent's viewpoint to the nearest in training")
+        axis.legend(fontsize=7.5, ncols=2)
+        return figure
+
+
+def _plain(axis: Axes) -> None:
+    axis.yaxis.set_major_formatter("{x:g}")
+    axis.yaxis.set_minor_formatter("")
+
+
 def _by_views(axis: Axes, rates: pd.DataFrame, views: list[str]) -> None:
-    """A line for each number of demonstrations with distractors and one without, with intervals."""
+    """A line for each number of demonstrations with distractors and one without."""
     groups = list(rates.groupby(["demonstrations", "clutter"], sort=False))
     counts = list(rates["demonstrations"].unique())
     for place, ((demonstrations, clutter), rows) in enumerate(groups):
         rows = rows.set_index("views").reindex(views)
-        bounds = rows[["distance_low", "distance_high"]].to_numpy(float)
+        bounds = rows[["nearest", "farthest"]].to_numpy(float)
         axis.errorbar(
             np.arange(len(views)) + 0.2 * ((place + 0.5) / len(groups) - 0.5),
             100 * rows["distance"],
@@ -60,19 +71,3 @@ def _by_views(axis: Axes, rates: pd.DataFrame, views: list[str]) -> None:
         )
     axis.set_xticks(range(len(views)), views)
     axis.grid(axis="x", visible=False)
-
-
-def _by_angle(axis: Axes, angles: pd.DataFrame) -> None:
-    """A line for each number of viewpoints, over all translators that have it."""
-    for place, (views, rows) in enumerate(angles.groupby("views", sort=False)):
-        axis.plot(
-            rows["angle"],
-            100 * rows["distance"],
-            color=PALETTE[place % len(PALETTE)],
-            marker="o",
-            markersize=3,
-            label=f"{views} view" if views in ("1", "any") else f"{views} views",
-        )
-    axis.set_xticks(range(0, 181, 45))
-    axis.set_xlabel("degrees from the agent's viewpoint to the nearest in training")
-    axis.legend(fontsize=7.5, ncols=2)
