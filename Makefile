@@ -36,7 +36,7 @@ beyond: .setup-stamp .setup-stamp-graphics ## run what goes beyond the thesis as
 
 evidence: .setup-stamp .setup-stamp-graphics ## several models of each kind, three questions: hours, see docs/scaling.md
 	dvc repro check simulate@diverse split@diverse
-	cd evidence && dvc repro && python report.py
+	cd evidence && { dvc repro --keep-going; ended=$$?; python report.py && exit $$ended; }
 
 test: lint .setup-stamp-graphics ## lint, type check and the fast tests
 	python -m pytest $(PARALLEL)

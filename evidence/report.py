@@ -10,11 +10,13 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from anyview.analysis import diversity, headline, replicates
+from anyview.analysis.cells import OURS
 from anyview.config import Params, load_params
 from anyview.paths import DATA
 from anyview.report.figures import diversity as diversity_figures
 from anyview.report.figures import losses as losses_figures
 from anyview.report.figures.style import to_svg
+from anyview.report.formatting import percent
 from anyview.report.text import ACTIONS, environment
 from anyview.runtime.errors import AnyviewError, refuse_arguments, run_stage
 from anyview.runtime.outputs import whole_folder
@@ -35,7 +37,8 @@ def losses(params: Params) -> Part | None:
     runs, curves = replicates.read_replicates(params)
     if runs.empty:
         return None
-    steps, budget = params.imitation.episodes_per_iteration * ACTIONS, params.evidence.losses
+    budget = params.evidence.losses
+    steps = budget.episodes_per_iteration * ACTIONS
     tables = {
         "rates": replicates.rates(runs),
         "ablations": replicates.ablations(runs),
@@ -49,13 +52,24 @@ def losses(params: Params) -> Part | None:
         "learning": losses_figures.learning(tables["learning"]),
     }
     page = {
-        "steps": params.imitation.iterations * steps,
+        "steps": budget.iterations * steps,
         "budgets": list(tables["claims"]["steps"].unique()),
         "verdicts": list(replicates.verdicts(tables["claims"]).itertuples()),
+        "parts": _parts(tables["shares"]),
         "few": bool((tables["claims"]["claim"] == "few").any()),
         "enough": replicates.ENOUGH_TRANSLATORS,
     }
     return Part(tables, figures, page)
+
+
+def _parts(shares: pd.DataFrame) -> dict[tuple[str, str], str]:
+    """L_f's part of a raw reward with all losses and without one, by reward and cell, as text."""
+    found = shares.set_index(["reward", "cell"])["share"]
+    return {
+        (reward, cell): f"{percent(found[reward, OURS])}, {percent(share)}"
+        for (reward, cell), share in found.items()
+        if (reward, OURS) in found
+    }
 
 
 def diverse(params: Params) -> Part | None:
@@ -67,18 +81,20 @@ def diverse(params: Params) -> Part | None:
     tables = {
         "rates": diversity.rates(runs),
         "effects": diversity.effects(runs, levels),
+        "leaving": diversity.leaving(runs),
         "angles": diversity.angles(runs, levels),
     }
-    imitation = params.imitation
+    budget, points = params.evidence.diversity, diversity.points(runs, levels)
     page = {
-        "steps": imitation.iterations * imitation.episodes_per_iteration * ACTIONS,
+        "steps": budget.iterations * budget.episodes_per_iteration * ACTIONS,
         "enough": list(diversity.enough(tables["effects"]).itertuples()),
         "evaluated": int(tables["rates"]["translators"].sum()),
         "planned": diversity.planned(params),
+        "angled": points["views"].nunique() > 1,
     }
     figures = {"views": diversity_figures.by_views(tables["rates"])}
-    if not tables["angles"].empty:
-        figures["angles"] = diversity_figures.by_angle(tables["angles"])
+    if points["views"].nunique() > 1:
+        figures["angles"] = diversity_figures.by_angle(points)
     return Part(tables, figures, page)
 
 

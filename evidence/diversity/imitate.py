@@ -34,7 +34,11 @@ def main(arguments: list[str]) -> None:
     ours = imitation.cells.get("ours")
     if not isinstance(ours, DemonstrationCell) or (ours.learner, ours.reward) != ("ddpg", "translated"):
         raise AnyviewError("params.yaml: imitation.cells.ours: must be of ddpg and translated demonstrations")
-    changed: dict[str, object] = {"cells": {name: ours.model_copy(update={"model": model})}}
+    changed: dict[str, object] = {
+        "cells": {name: ours.model_copy(update={"model": model})},
+        "iterations": diversity.iterations,
+        "episodes_per_iteration": diversity.episodes_per_iteration,
+    }
     if evaluation != "diverse":
         changed["dataset"] = dataset
     params = params.model_copy(

@@ -18,7 +18,7 @@ def main(arguments: list[str]) -> None:
     translator, seed = choose_each(
         arguments, {"TRANSLATOR": losses.translators, "SEED": losses.seeds}, "losses/train.py"
     )
-    cell = params.translators[translator].model_copy(update={"iterations": losses.iterations})
+    cell = params.translators[translator].model_copy(update={"iterations": losses.translator_iterations})
     # One seed is the same first weights and the same batches for every cell: they differ in their losses.
     objective = TranslatorObjective(cell, params.training, int(seed), open_dataset(cell.dataset))
     name = paths.replicate(translator, int(seed))

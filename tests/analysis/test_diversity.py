@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from anyview.analysis.diversity import angles, effects, enough, nearest, rates
+from anyview.analysis.diversity import angles, effects, enough, leaving, nearest, points, rates
 from anyview.analysis.statistics import holm
 
 LEVELS = {"views": ["1", "4", "any"], "clutter": ["plain", "distractors"], "demonstrations": ["250", "4000"]}
@@ -44,21 +44,38 @@ def test_what_is_worse_better_and_neither_is_told_apart():
     assert list(table["pairs"]) == [8, 8, 12, 12]
     assert table["ratio"]["views", "1"] == pytest.approx(0.3 / 0.02, rel=0.3)
     assert table["value"]["views", "1"] < 0
-    needed = enough(table.reset_index()).set_index("factor")
-    assert needed["level"].to_dict() == {"views": "4", "clutter": "plain", "demonstrations": "250"}
+    found = enough(table.reset_index()).set_index("factor")
+    assert found["worse"].to_dict() == {"views": ("1",), "clutter": (), "demonstrations": ()}
+    assert [other.level for other in found["others"]["views"]] == ["4"]
 
 
-def test_of_a_factor_whose_every_lower_level_is_worse_the_most_is_needed():
-    table = effects(runs_of(lambda views, *_: {"1": 0.3, "4": 0.1, "any": 0.02}[views]), LEVELS)
-    assert enough(table).set_index("factor").loc["views", "level"] == "any"
+def test_where_all_else_fails_an_effect_shows_with_the_most_of_the_rest():
+    """With one view nothing works, whatever the demonstrations: they matter where views are many."""
+    runs = runs_of(lambda views, _, count: 0.5 if views == "1" or count == "250" else 0.01, noise=0.0)
+    row = effects(runs, LEVELS).set_index(["factor", "level"]).loc["demonstrations", "250"]
+    assert row["rest"] == pytest.approx(50)
+    assert row["ratio"] == pytest.approx(50 ** (2 / 3))  # of three levels of views one does not change
+    alone = runs[runs["clutter"] == "plain"]
+    assert np.isnan(effects(alone, LEVELS)["rest"]).all()
 
 
-def test_runs_in_contexts_of_their_own_are_not_compared():
+def test_in_contexts_of_the_training_demonstrations_alone_are_compared():
     own = runs_of(lambda views, *_: 0.3 if views == "any" else 0.01, evaluation="own")
-    assert effects(own, LEVELS).empty
+    assert set(effects(own, LEVELS)["factor"]) == {"demonstrations"}
+    assert enough(effects(own, LEVELS)).empty
     assert angles(own, LEVELS).empty
-    both = pd.concat([own, runs_of(by_views)])
-    pd.testing.assert_frame_equal(effects(both, LEVELS), effects(runs_of(by_views), LEVELS))
+    assert points(own, LEVELS).empty
+
+
+def test_what_leaving_the_training_costs_is_of_the_same_translators_and_scenes():
+    own = runs_of(lambda *_: 0.01, evaluation="own", noise=0.0)
+    there = runs_of(lambda views, *_: 0.03 if views == "1" else 0.01, noise=0.0)
+    table = leaving(pd.concat([own, there])).set_index(["views", "clutter"])
+    np.testing.assert_allclose(table["ratio"]["1"], 3)
+    np.testing.assert_allclose(table["ratio"]["any"], 1)
+    assert (table["own"] == own["success"].mean()).all()
+    assert set(table["translators"]) == {4}
+    assert leaving(own).empty
 
 
 def test_ratio_and_test_are_of_pairs_that_differ_in_one_factor_alone():
@@ -88,10 +105,12 @@ def test_pairs_that_are_not_there_yet_are_left_out_and_few_carry_no_claim():
     found = table.set_index(["factor", "level"])
     assert found["claim"]["views", "1"] == "few"  # 4 pairs
     assert np.isnan(found["p"]["views", "1"])  # so that it takes nothing from the others' tests
-    assert enough(table).set_index("factor").loc["views", "level"] == ""
+    assert enough(table).set_index("factor")["others"]["views"][0].claim == "few"
     runs = runs_of(by_views)
     missing = (runs["views"] == "1") & (runs["clutter"] == "plain") & (runs["seed"] == 2)
-    assert list(effects(runs[~missing], LEVELS)["pairs"]) == [6, 8, 10, 11]
+    rest = effects(runs[~missing], LEVELS)
+    assert list(rest["pairs"]) == [6, 8, 10, 11]
+    assert rest["claim"][0] == "few"
     alone = effects(runs[runs["views"] == "1"], LEVELS)
     assert set(alone["factor"]) == {"clutter", "demonstrations"}
 
@@ -142,4 +161,5 @@ def test_hard_contexts_do_not_pass_for_an_effect_of_the_angle():
     table = angles(runs, LEVELS).set_index("views")
     assert table.loc["1", "distance"].max() > 1.3 * table.loc["1", "distance"].min()
     np.testing.assert_allclose(table.loc["1", "ratio"], 3)
+    np.testing.assert_allclose(points(runs, LEVELS).set_index("views").loc["1", "ratio"], 3)
     assert angles(runs[runs["views"] == "1"], LEVELS)["ratio"].isna().all()

@@ -138,7 +138,7 @@ def test_the_part_of_features_in_a_raw_reward_is_found_from_what_standing_still_
 
 
 def test_only_what_has_all_of_its_seeds_is_read(data, params):
-    evidence, last = params.evidence.losses, params.imitation.iterations
+    evidence, last = params.evidence.losses, params.evidence.losses.iterations
     for seed in evidence.seeds:
         data.policies(paths.replicate("sim", seed, "raw"), 0.03, last=last)
         data.policies(paths.replicate("sim-no-alignment", seed, "raw"), 0.3, last=last)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from anyview.diversity.sets import first_demonstrations, restrict
+from anyview.diversity.sets import chosen, restrict, some_demonstrations
 from anyview.pusher.contexts import sample_contexts
 from anyview.pusher.expert import roll_out
 from anyview.runtime.errors import AnyviewError
@@ -51,16 +51,23 @@ def dataset(splits: list[str]) -> Dataset:
     return Dataset("views-4-plain", np.zeros((len(splits), 2, 4, 4, 3), np.uint8), clips)
 
 
-def test_of_the_first_demonstrations_the_split_stays_and_the_others_have_none():
-    first = first_demonstrations(dataset(["train", "validation", "train", "train", "validation"]), 3)
-    assert first.split("train").tolist() == [0, 2]
-    assert first.split("validation").tolist() == [1]
-    assert len(first.frames) == 5
+def test_of_some_demonstrations_the_split_stays_and_the_others_have_none():
+    whole = dataset(["train", "validation"] * 20)
+    some = some_demonstrations(whole, 10, 1)
+    kept = some.clips["split"] != ""
+    assert kept.sum() == 10
+    assert (some.clips["split"][kept] == whole.clips["split"][kept]).all()
+    assert len(some.frames) == 40
+
+
+def test_more_demonstrations_hold_the_fewer_and_another_seed_has_others():
+    fewer, more, other = chosen(40, 10, 1), chosen(40, 25, 1), chosen(40, 10, 2)
+    assert (more[fewer]).all()
+    assert (fewer != other).any()
+    assert chosen(40, 40, 1).all()
 
 
 @pytest.mark.parametrize("count", [1, 3])
 def test_too_few_to_learn_from_are_told(count):
-    with pytest.raises(
-        AnyviewError, match=f"the first {count} of views-4-plain leave none to train on, or none"
-    ):
-        first_demonstrations(dataset(["train", "train", "train", "validation"]), count)
+    with pytest.raises(AnyviewError, match=f": {count} of views-4-plain leave none to train on, or none to"):
+        some_demonstrations(dataset(["train"] * 4), count, 1)

@@ -45,11 +45,12 @@ def rates(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def against_ours(runs: pd.DataFrame) -> pd.DataFrame:
-    """Every other method against `ours`, model by model of one seed, in the same contexts.
+    """Every other method against `ours`, in the same contexts.
 
     ``cell``, then as ``replicates.contrast`` has it; ``farther``: models with which the object ends farther
-    away; ``p``: sign-flip test over contexts of the mean log ratio of these models, corrected for all rows.
-    It says nothing of other models, of which there are too few to test; the intervals are of those too.
+    away than with those of `ours` in the mean; ``p``: sign-flip test over contexts of the mean log ratio of
+    these models, corrected for all rows. It says nothing of other models, of which there are too few to test;
+    the intervals are of those too.
     """
     tables = {cell: by_context(table) for cell, table in runs.groupby("cell", sort=False)}
     rows = []
@@ -63,7 +64,7 @@ def against_ours(runs: pd.DataFrame) -> pd.DataFrame:
                 "cell": cell,
                 "models": len(logs),
                 **contrast(success - our_success, differences),
-                "farther": (differences.mean(axis=1) > 0).sum(),
+                "farther": (logs.mean(axis=1) > our_logs.mean()).sum(),
                 "p": sign_flip_test(differences.mean(axis=0)),
             }
         )

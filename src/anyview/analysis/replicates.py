@@ -17,8 +17,8 @@ from anyview.analysis.study import EvaluatedMethod, read_method
 from anyview.config import Params, RewardWeights
 from anyview.runtime.errors import AnyviewError
 
-ENOUGH_TRANSLATORS = 4
-"""With fewer of a kind, not even a test of translators that all agree would reach 5%."""
+ENOUGH_TRANSLATORS = 5
+"""With fewer of a kind, not even translators that all agree would reach 5% beside three other losses."""
 
 BUDGETS = (1 / 4, 1 / 2, 1)
 """Parts of the training of policies after which the claims are judged."""
@@ -39,7 +39,7 @@ def read_replicates(params: Params, root: Path = Path()) -> tuple[pd.DataFrame, 
                 for seed in losses.seeds_under(reward)
             }
             for seed, folder in folders.items() if all(map(Path.exists, folders.values())) else ():
-                method = read_whole(folder, params.imitation.iterations)
+                method = read_whole(folder, losses.iterations)
                 keys = {"reward": reward, "cell": ablation(translator), "seed": seed}
                 columns = ["run", "success", "final_distance", "return_still"]
                 runs.append(method.runs[columns].assign(**keys))

@@ -29,18 +29,19 @@ def crossed_error(values: np.ndarray) -> tuple[float, float]:
     degrees are Satterthwaite's (1946). With one model it is of the contexts alone.
     """
     models, contexts = values.shape
-    overall, of_models, of_contexts = values.mean(), values.mean(axis=1), values.mean(axis=0)
-    contexts_part, freedom = of_contexts.var(ddof=1) / contexts, contexts - 1.0
-    if models == 1:
-        return float(np.sqrt(contexts_part)), freedom
-    models_part = of_models.var(ddof=1) / models
-    unexplained = np.sum((values - of_models[:, None] - of_contexts + overall) ** 2) / freedom / (models - 1)
-    both = models_part + contexts_part
-    if both > 0:
-        freedom = both**2 / (models_part**2 / (models - 1) + contexts_part**2 / freedom)
-    # Both parts hold the unexplained one, which counts once; an estimate of it may be too large.
-    variance = max(both - unexplained / values.size, models_part, contexts_part)
-    return float(np.sqrt(variance)), float(freedom)
+    of_models, of_contexts = values.mean(axis=1), values.mean(axis=0)
+    parts = [(of_contexts.var(ddof=1) / contexts, contexts - 1)]
+    if models > 1:
+        left = values - of_models[:, None] - of_contexts + values.mean()
+        freedom = (models - 1) * (contexts - 1)
+        unexplained = np.sum(left**2) / freedom / left.size
+        parts += [(of_models.var(ddof=1) / models, models - 1), (-unexplained, freedom)]
+    # Both means hold what neither explains, which counts once; the estimate of it may be too large.
+    variance = max(sum(part for part, _ in parts), *(part for part, _ in parts))
+    if variance == 0:
+        return 0.0, contexts - 1.0
+    freedom = variance**2 / sum(part**2 / freedom for part, freedom in parts)
+    return float(np.sqrt(variance)), max(float(freedom), min(least for _, least in parts))
 
 
 def crossed_interval(values: np.ndarray) -> Interval:
@@ -54,13 +55,16 @@ def crossed_rate_interval(successes: np.ndarray) -> Interval:
     """Wilson's interval of the rate of ``successes`` (K, n) of K models in the same n contexts.
 
     Of as many trials as would have the error that ``crossed_error`` finds, as for clustered samples (Korn and
-    Graubard, 1998); of n where all succeed or none.
+    Graubard, 1998), and never narrower towards 0 and 1 than n contexts that all agree would leave it.
     """
-    rate, (error, freedom) = float(successes.mean()), crossed_error(np.asarray(successes, float))
-    trials = min(rate * (1 - rate) / error**2, successes.size) if error > 0 else successes.shape[1]
+    rate, contexts = float(successes.mean()), successes.shape[1]
+    error, freedom = crossed_error(np.asarray(successes, float))
+    trials = min(rate * (1 - rate) / error**2, successes.size) if error > 0 else contexts
     z2 = stats.t.ppf(0.975, freedom) ** 2 / trials
     centre, reach = rate + z2 / 2, np.sqrt(z2 * (rate * (1 - rate) + z2 / 4))
-    return float((centre - reach) / (1 + z2)), float((centre + reach) / (1 + z2))
+    open_end = 1 / (1 + contexts / stats.t.ppf(0.975, contexts - 1) ** 2)
+    low, high = (centre - reach) / (1 + z2), (centre + reach) / (1 + z2)
+    return float(min(low, 1 - open_end)), float(max(high, open_end))
 
 
 def resampled(values: np.ndarray, rng: np.random.Generator) -> np.ndarray:

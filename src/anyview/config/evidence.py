@@ -25,6 +25,14 @@ def _rising(values: list) -> list:
 Seeds = Annotated[list[Annotated[int, Field(ge=0)]], Field(min_length=1), AfterValidator(_distinct)]
 
 
+class Budget(Block):
+    """How much a part of the evidence trains, instead of what cells of the study do."""
+
+    translator_iterations: Count = Field(description="of each translator, instead of the cell's own")
+    iterations: Count = Field(description="of the policies, instead of `imitation.iterations`")
+    episodes_per_iteration: Count = Field(description="instead of `imitation.episodes_per_iteration`")
+
+
 class OtherRewards(Block):
     """Rewards under which some of the translators alone are evaluated."""
 
@@ -32,14 +40,13 @@ class OtherRewards(Block):
     rewards: dict[Name, RewardWeights] = Field(min_length=1)
 
 
-class Losses(Block):
+class Losses(Budget):
     """Part `losses` of the evidence: the translators of figure 20, each trained several times, for `ours`."""
 
     translators: Annotated[list[str], AfterValidator(_distinct)] = Field(
         min_length=2, description="cells of `translators`; the first has every loss, the others lack some"
     )
     seeds: Seeds = Field(description="of the trainings, one of each translator for each seed")
-    iterations: Count = Field(description="of each training, instead of the cell's own")
     rewards: dict[Name, RewardWeights] = Field(min_length=1)
     others: OtherRewards
 
@@ -61,7 +68,7 @@ class Losses(Block):
         return self.seeds if reward in self.rewards else self.others.seeds
 
 
-class Diversity(Block):
+class Diversity(Budget):
     """Part `diversity` of the evidence: translators of more and more diverse contexts, for `ours`."""
 
     translator: str = Field(description="the cell of `translators` that each of them is trained as")
@@ -71,13 +78,12 @@ class Diversity(Block):
         "from its own",
     )
     demonstrations: Annotated[list[Count], AfterValidator(_rising)] = Field(
-        min_length=1, description="how many of them are learned from, the first ones, with their split"
+        min_length=1, description="how many of them are learned from, drawn by the seed, with their split"
     )
     seeds: Seeds = Field(description="of the trainings, one of each translator for each seed")
-    iterations: Count = Field(description="of each training, instead of the cell's own")
 
 
-class Headline(Block):
+class Headline(Budget):
     """Part `headline` of the evidence: the main methods, with several models each, at full budget."""
 
     translator: str = Field(description="the cell of `translators` that is the model of `translated`")
@@ -89,10 +95,7 @@ class Headline(Block):
         description="cells of `imitation.cells`"
     )
     seeds: Seeds = Field(description="of the trainings, one translator and one embedding for each seed")
-    translator_iterations: Count = Field(description="of each translator, instead of the cell's own")
     embedding_iterations: Count = Field(description="of each embedding, instead of the cell's own")
-    iterations: Count = Field(description="of the policies, instead of `imitation.iterations`")
-    episodes_per_iteration: Count = Field(description="instead of `imitation.episodes_per_iteration`")
 
     @property
     def cells(self) -> list[str]:

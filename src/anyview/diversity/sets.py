@@ -11,6 +11,7 @@ from anyview.pusher.contexts import Context
 from anyview.pusher.kinematics import wrap
 from anyview.pusher.proposals import DECIMALS
 from anyview.runtime.errors import AnyviewError
+from anyview.seeds import stream
 from anyview.video.datasets import Dataset
 
 
@@ -32,19 +33,29 @@ def restriction(views: str, clutter: str) -> Callable[[Context], Context]:
     return partial(restrict, views=count, distractors=clutter == "distractors")
 
 
-def first_demonstrations(dataset: Dataset, count: int) -> Dataset:
-    """``dataset`` with the split of its first ``count`` clips alone: nothing of the others is learned.
+def chosen(total: int, count: int, seed: int) -> np.ndarray:
+    """Which ``count`` of ``total`` demonstrations a training of ``seed`` learns from: (total,) bool.
+
+    More of them hold all of fewer. Those of different seeds differ: which ones they are is luck as well.
+    """
+    mask = np.zeros(total, bool)
+    mask[stream(seed, "demonstrations").permutation(total)[:count]] = True
+    return mask
+
+
+def some_demonstrations(dataset: Dataset, count: int, seed: int) -> Dataset:
+    """``dataset`` with the split of the ``chosen`` clips alone: nothing of the others is learned.
 
     Raises AnyviewError if it has fewer, or these leave fewer than two to train on, or none to validate with.
     """
     if count > len(dataset.clips):
         has = f"{dataset.name} has {len(dataset.clips)}"
         raise AnyviewError(f"params.yaml: evidence.diversity.demonstrations: {count}, but {has}")
-    kept = np.arange(len(dataset.clips)) < count
-    first = replace(dataset, clips=dataset.clips.assign(split=dataset.clips["split"].where(kept, "")))
-    if len(first.split("train")) < 2 or not len(first.split("validation")):
+    kept = chosen(len(dataset.clips), count, seed)
+    some = replace(dataset, clips=dataset.clips.assign(split=dataset.clips["split"].where(kept, "")))
+    if len(some.split("train")) < 2 or not len(some.split("validation")):
         raise AnyviewError(
-            f"params.yaml: evidence.diversity.demonstrations: the first {count} of {dataset.name} leave none "
-            "to train on, or none to validate with"
+            f"params.yaml: evidence.diversity.demonstrations: {count} of {dataset.name} leave none to train "
+            "on, or none to validate with"
         )
-    return first
+    return some

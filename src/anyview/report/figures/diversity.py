@@ -25,17 +25,19 @@ def by_views(rates: pd.DataFrame) -> Figure:
         return figure
 
 
-def by_angle(angles: pd.DataFrame) -> Figure:
-    """How many times as far as with the most viewpoints in the same contexts, by the nearest one's angle."""
+def by_angle(points: pd.DataFrame) -> Figure:
+    """How many times as far as with the most viewpoints, by the angle to the nearest: a point a context."""
+    *fewer, _ = points["views"].unique()
     with canvas(2.6) as (figure, (axis,)):
-        for place, (views, rows) in enumerate(angles.groupby("views", sort=False)):
-            axis.plot(
+        for place, views in enumerate(fewer):
+            rows = points[points["views"] == views]
+            axis.scatter(
                 rows["angle"],
                 rows["ratio"],
+                s=14,
                 color=PALETTE[place % len(PALETTE)],
-                marker="o",
-                markersize=3,
-                label=f"{views} view" if views in ("1", "any") else f"{views} views",
+                marker="os^D"[place % 4],
+                label=f"{views} view" if views == "1" else f"{views} views",
             )
         axis.set(yscale="log", ylabel="times as far")
         _plain(axis)
