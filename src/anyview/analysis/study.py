@@ -191,7 +191,7 @@ def read_study(params: Params, root: Path = Path()) -> Study:
         {cell: _model(folder) for cell, folder in models.items()},
         {cell: _translator(folder) for cell, folder in translations.items()},
         {cell: read_method(folder) for cell, folder in policies.items()},
-        _azimuths(real[paths.REAL], filmed[SURROGATE]) if filmed else pd.Series(dtype=float),
+        read_azimuths(real[paths.REAL], filmed[SURROGATE]) if filmed else pd.Series(dtype=float),
         _rankings(root / paths.RANKINGS) if rankings else None,
         tuple(path for group in groups for path in group.values()),
     )
@@ -207,8 +207,8 @@ def _real(folder: Path) -> RealClips:
     return RealClips(len(recorded), len(refused))
 
 
-def _azimuths(clips: Path, raw: Path) -> pd.Series:
-    """Where the cameras stood of those ``clips`` whose ``raw`` ones tell it."""
+def read_azimuths(clips: Path, raw: Path) -> pd.Series:
+    """Where the cameras stood of those ``clips`` whose ``raw`` ones tell it, in degrees by clip."""
     named = read_table(clips / "manifest.csv", ["clip", "pair", "camera"], unique="clip")
     told = read_table(raw / "manifest.csv", ["pair", "camera"])
     if "azimuth" not in told:

@@ -1,5 +1,7 @@
 """Does it matter from where a clip was filmed? By the angle between its camera and the one that it is for."""
 
+from collections.abc import Iterator
+
 import pandas as pd
 
 from anyview.analysis.cells import in_order
@@ -45,14 +47,22 @@ def placed_by_angle(study: Study, estimator: Estimator) -> pd.DataFrame:
     rows: list[tuple[str, str, Estimate]] = []
     for cell in filter(study.is_real, study.translators):
         clips = study.translators[cell].split("validation")
-        angle = _between(clips["source"].map(study.azimuths), clips["clip"].map(study.azimuths))
-        for centre, members in clips[clips[PLACED].notna()].groupby(_WIDTH * (angle / _WIDTH).round()):
+        for centre, members in angle_classes(clips, study.azimuths):
             values, pairs = members[PLACED].to_numpy(float), members["pair"].to_numpy()
             rows += [
                 (cell, f"{centre:g}.clips", without_interval(len(members))),
                 (cell, f"{centre:g}.{PLACED}", estimator.mean(f"{cell}/{centre:g}/{PLACED}", values, pairs)),
             ]
     return tidy(rows)
+
+
+def angle_classes(clips: pd.DataFrame, azimuths: pd.Series) -> Iterator[tuple[float, pd.DataFrame]]:
+    """Translated ``clips`` that have an object, by the nearest multiple of 30 degrees between both cameras.
+
+    ``azimuths`` are degrees by clip, as ``Study`` has them.
+    """
+    angle = _between(clips["source"].map(azimuths), clips["clip"].map(azimuths))
+    yield from clips[clips[PLACED].notna()].groupby(_WIDTH * (angle / _WIDTH).round())
 
 
 def angles(table: pd.DataFrame, cell: str, metric: str) -> pd.DataFrame:
