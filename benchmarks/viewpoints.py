@@ -45,9 +45,8 @@ def prepare(folder: Path, pairs: int) -> None:
     manifest = pd.read_csv(folder / paths.clip_set(paths.REAL) / "manifest.csv")
     split = folder / paths.split_table(paths.REAL)
     split.parent.mkdir(parents=True, exist_ok=True)
-    held_out = (
-        manifest["pair"] != manifest["pair"].iloc[0]
-    )  # a data set has clips to train on, these two here
+    # A data set has clips to train on: these two here.
+    held_out = manifest["pair"] != manifest["pair"].iloc[0]
     splits = held_out.map({True: "validation", False: "train"})
     manifest[["clip", "pair"]].assign(split=splits).to_csv(split, index=False)
 

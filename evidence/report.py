@@ -90,10 +90,10 @@ def diverse(params: Params) -> Part | None:
         "enough": list(diversity.enough(tables["effects"]).itertuples()),
         "evaluated": int(tables["rates"]["translators"].sum()),
         "planned": diversity.planned(params),
-        "angled": points["views"].nunique() > 1,
+        "angled": not points.empty,
     }
     figures = {"views": diversity_figures.by_views(tables["rates"])}
-    if points["views"].nunique() > 1:
+    if not points.empty:
         figures["angles"] = diversity_figures.by_angle(points)
     return Part(tables, figures, page)
 

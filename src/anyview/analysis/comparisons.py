@@ -108,15 +108,19 @@ def factorial(methods: Methods, estimator: Estimator) -> pd.DataFrame:
 
 
 def claimed(
-    contrasts: pd.DataFrame, counted: str = "runs", less: str = "nearer", more: str = "farther"
+    contrasts: pd.DataFrame,
+    counted: str = "runs",
+    less: str = "nearer",
+    more: str = "farther",
+    enough: int = ENOUGH_RUNS,
 ) -> list[str]:
     """The order that may be claimed of each contrast: ``less`` or ``more``, ``open`` or ``few``.
 
-    ``few``: the column ``counted`` is below ``ENOUGH_RUNS``. ``open``: the corrected test does not exclude
+    ``few``: the column ``counted`` is below ``enough``. ``open``: the corrected test does not exclude
     chance.
     """
     return [
-        "few" if count < ENOUGH_RUNS else "open" if p >= SIGNIFICANT else more if ratio > 1 else less
+        "few" if count < enough else "open" if p >= SIGNIFICANT else more if ratio > 1 else less
         for count, p, ratio in contrasts[[counted, "p", "ratio"]].itertuples(index=False)
     ]
 

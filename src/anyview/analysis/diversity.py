@@ -121,9 +121,7 @@ def effects(runs: pd.DataFrame, levels: dict[str, list[str]]) -> pd.DataFrame:
     table = pd.DataFrame(rows, columns=names)
     table.loc[table["pairs"] < ENOUGH_PAIRS, "p"] = np.nan
     table["p"] = corrected(table["p"])
-    table["claim"] = claimed(table, "pairs", "better", "worse")
-    table.loc[table["pairs"] < ENOUGH_PAIRS, "claim"] = "few"
-    return table
+    return table.assign(claim=claimed(table, "pairs", "better", "worse", ENOUGH_PAIRS))
 
 
 def leaving(runs: pd.DataFrame) -> pd.DataFrame:
@@ -184,8 +182,13 @@ def angles(runs: pd.DataFrame, levels: dict[str, list[str]]) -> pd.DataFrame:
 
 
 def points(runs: pd.DataFrame, levels: dict[str, list[str]]) -> pd.DataFrame:
-    """``views, run, angle, ratio`` as ``angles`` has them, of every context by itself."""
-    means = _beside_most(runs, levels).groupby(["views", "run"], sort=False)[["angle", "beside"]].mean()
+    """``views, run, angle, ratio`` as ``angles`` has them, of every context by itself.
+
+    Of fewer viewpoints than the most, where this one was run.
+    """
+    logs = _beside_most(runs, levels).dropna(subset="beside")
+    fewer = logs[logs["views"] != levels["views"][-1]]
+    means = fewer.groupby(["views", "run"], sort=False)[["angle", "beside"]].mean()
     return means.assign(ratio=np.exp(means["beside"])).drop(columns="beside").reset_index()
 
 

@@ -27,9 +27,8 @@ def by_views(rates: pd.DataFrame) -> Figure:
 
 def by_angle(points: pd.DataFrame) -> Figure:
     """How many times as far as with the most viewpoints, by the angle to the nearest: a point a context."""
-    *fewer, _ = points["views"].unique()
     with canvas(2.6) as (figure, (axis,)):
-        for place, views in enumerate(fewer):
+        for place, views in enumerate(points["views"].unique()):
             rows = points[points["views"] == views]
             axis.scatter(
                 rows["angle"],
