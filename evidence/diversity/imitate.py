@@ -36,8 +36,7 @@ def main(arguments: list[str]) -> None:
         raise AnyviewError("params.yaml: imitation.cells.ours: must be of ddpg and translated demonstrations")
     changed: dict[str, object] = {
         "cells": {name: ours.model_copy(update={"model": model})},
-        "iterations": diversity.iterations,
-        "episodes_per_iteration": diversity.episodes_per_iteration,
+        **diversity.policies,
     }
     if evaluation != "diverse":
         changed["dataset"] = dataset

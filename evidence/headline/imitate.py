@@ -24,11 +24,7 @@ def main(arguments: list[str]) -> None:
     cell = params.imitation.cells[cell_name]
     model = paths.replicate(paths.headline(cell.model), int(seed))
     name = paths.replicate(paths.headline(cell_name), int(seed))
-    changed = {
-        "cells": {name: cell.model_copy(update={"model": model})},
-        "iterations": headline.iterations,
-        "episodes_per_iteration": headline.episodes_per_iteration,
-    }
+    changed = {"cells": {name: cell.model_copy(update={"model": model})}, **headline.policies}
     params = params.model_copy(update={"imitation": params.imitation.model_copy(update=changed)})
     method = Method(LEARNERS[cell.learner], make_reward)
     evaluate_method(name, params, method, [paths.model(model)])

@@ -26,8 +26,7 @@ def main(arguments: list[str]) -> None:
     if not isinstance(ours, DemonstrationCell) or (ours.learner, ours.reward) != ("ddpg", "translated"):
         raise AnyviewError("params.yaml: imitation.cells.ours: must be of ddpg and translated demonstrations")
     cell = ours.model_copy(update={"model": model, "weights": losses.every_reward[reward]})
-    budget = {"iterations": losses.iterations, "episodes_per_iteration": losses.episodes_per_iteration}
-    imitation = params.imitation.model_copy(update={"cells": {name: cell}, **budget})
+    imitation = params.imitation.model_copy(update={"cells": {name: cell}, **losses.policies})
     method = Method(ddpg.make_learner, make_reward)
     evaluate_method(name, params.model_copy(update={"imitation": imitation}), method, [paths.model(model)])
 

@@ -32,6 +32,11 @@ class Budget(Block):
     iterations: Count = Field(description="of the policies, instead of `imitation.iterations`")
     episodes_per_iteration: Count = Field(description="instead of `imitation.episodes_per_iteration`")
 
+    @property
+    def policies(self) -> dict[str, int]:
+        """What of `imitation` it replaces."""
+        return {"iterations": self.iterations, "episodes_per_iteration": self.episodes_per_iteration}
+
 
 class OtherRewards(Block):
     """Rewards under which some of the translators alone are evaluated."""
