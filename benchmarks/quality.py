@@ -39,6 +39,7 @@ from anyview.pusher.contexts import Context, sample_contexts
 from anyview.pusher.episodes import episode
 from anyview.rewards.demonstration import DemonstrationReward, translate_demonstrations
 from anyview.runtime.device import torch_device, use_threads, worker_count
+from anyview.runtime.errors import exit_code
 from anyview.runtime.workers import run_tasks
 from anyview.seeds import stream
 from anyview.translator.weights import load_translator
@@ -141,7 +142,7 @@ def make_model(folder: Path, changes: Sequence[str]) -> dict[str, float]:
         *above, last = key.split(".")
         branch = values
         for part in above:
-            branch = branch[part]
+            branch = branch.setdefault(part, {})
         branch[last] = yaml.load(value)
     with (folder / "params.yaml").open("w") as file:
         yaml.dump(values, file)
@@ -204,4 +205,4 @@ def main() -> None:
 
 if __name__ == "__main__":
     torch.set_num_threads(1)
-    main()
+    sys.exit(exit_code(main))

@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 import torch
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
+from scipy.special import logsumexp
 
 from anyview.config import RewardWeights
 from anyview.learners.common.interfaces import RewardSource
@@ -21,13 +24,26 @@ def episode(reward: RewardSource, clips: np.ndarray) -> np.ndarray:
 
 def test_a_plan_of_little_entropy_is_the_best_assignment() -> None:
     cost = torch.from_numpy(np.random.default_rng(0).uniform(size=(3, 8, 8)))
-    plan = transport_plan(cost, 0.002, 5000)
+    plan = transport_plan(cost, 0.002, 500)
     torch.testing.assert_close(plan.sum(-1), torch.full((3, 8), 1 / 8, dtype=torch.float64))
     torch.testing.assert_close(
         plan.sum(-2), torch.full((3, 8), 1 / 8, dtype=torch.float64), atol=1e-4, rtol=0
     )
     for one, each in zip(cost.numpy(), plan.numpy(), strict=True):
         assert (one * each).sum() == pytest.approx(one[linear_sum_assignment(one)].mean(), abs=2e-3)
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(-2, 4))
+def test_a_plan_is_that_of_iterations_of_logarithms(seed: int, magnitude: float) -> None:
+    cost = 10**magnitude * np.random.default_rng(seed).uniform(size=(7, 5))
+    potentials = np.zeros(7)
+    for _ in range(30):
+        of_columns = -np.log(5) - logsumexp(potentials[:, None] - cost / 0.05, axis=0)
+        potentials = -np.log(7) - logsumexp(of_columns - cost / 0.05, axis=1)
+    expected = np.exp(potentials[:, None] + of_columns - cost / 0.05)
+    plan = transport_plan(torch.from_numpy(cost), 0.05, 3)
+    np.testing.assert_allclose(plan.sum(-1), np.full(7, 1 / 7), rtol=1e-9)
+    np.testing.assert_allclose(plan, expected, atol=1e-6)
 
 
 def test_distances_are_those_between_all_pairs() -> None:
@@ -68,7 +84,7 @@ def test_reward_is_the_mean_cost_of_the_plans(translator, expert_clips) -> None:
         units = [np.mean([float(pair[term][1]) for pair in costs]) for term in range(2)]
         for (feature, _), (image, _) in costs:
             cost = (feature / units[0] + 0.7 * image / units[1]) / 1.7
-            expected -= 49 / 2 * (transport_plan(cost, 0.05, 100) * cost).sum(-1).numpy()
+            expected -= 49 / 2 * (transport_plan(cost, 0.05, 10) * cost).sum(-1).numpy()
         np.testing.assert_allclose(earned[run, 0], expected, rtol=2e-3, atol=2e-3)
 
 

@@ -15,7 +15,8 @@ from anyview.translator.architectures import Translator
 from anyview.video.pixels import to_frames, to_input
 
 _ENTROPY = 0.05  # in units of what standing still costs
-_ITERATIONS = 100
+_ROUNDS = 10
+_LEAST = 1e-30  # mass: no factor is infinite
 
 
 class TransportReward:
@@ -79,7 +80,7 @@ class TransportReward:
                 if factor.any()
             ]
         ).sum(0)
-        paid = (transport_plan(cost, _ENTROPY, _ITERATIONS) * cost).sum(-1)
+        paid = (transport_plan(cost, _ENTROPY, _ROUNDS) * cost).sum(-1)
         return -paid.mean(2) * cost.shape[-2]
 
     def end_iteration(self) -> Arrays:
@@ -114,17 +115,24 @@ def squared_distances(episodes: Tensor, clips: Tensor) -> Tensor:
     return (squares - 2 * products).clamp_min(0.0)
 
 
-def transport_plan(cost: Tensor, entropy: float, iterations: int) -> Tensor:
+def transport_plan(cost: Tensor, entropy: float, rounds: int) -> Tensor:
     """The plan (..., T, J) that moves mass 1/T of each row to mass 1/J of each column at ``cost``, as large.
 
-    It minimises its cost minus ``entropy`` times its entropy, by Sinkhorn's ``iterations`` (Cuturi 2013) of
-    logarithms. The rows' sums are met exactly.
+    It minimises its cost minus ``entropy`` times its entropy, by Sinkhorn's iterations (Cuturi 2013). The
+    first of each round is one of logarithms, which bear any cost; nine are factors to what it gave, two
+    products each and so several times as fast. The rows' sums are met exactly.
     """
     rows, columns = cost.shape[-2:]
     scaled = -cost / entropy
-    of_columns = torch.zeros_like(cost[..., :1, :])
-    of_rows = torch.zeros_like(cost[..., :1])
-    for _ in range(iterations):
+    of_rows, plan = torch.zeros_like(cost[..., :1]), cost
+    for _ in range(rounds):
         of_columns = -np.log(columns) - torch.logsumexp(scaled + of_rows, dim=-2, keepdim=True)
         of_rows = -np.log(rows) - torch.logsumexp(scaled + of_columns, dim=-1, keepdim=True)
-    return (scaled + of_rows + of_columns).exp()
+        plan = (scaled + of_rows + of_columns).exp()
+        column_factors, row_factors = torch.ones_like(of_columns), torch.ones_like(of_rows)
+        for _ in range(9):
+            column_factors = 1 / columns / (row_factors.mT @ plan).clamp_min(_LEAST)
+            row_factors = 1 / rows / (plan @ column_factors.mT).clamp_min(_LEAST)
+        of_rows = of_rows + row_factors.log()
+        plan = row_factors * plan * column_factors
+    return plan
