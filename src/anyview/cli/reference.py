@@ -48,10 +48,11 @@ def _cells(key: str, cells: dict[str, BaseModel]) -> str:
         names = [name for name, cell in cells.items() if type(cell) is kind]
         text += f"\n## `{key}.<name>`: {(kind.__doc__ or '').strip()}\n\n"
         text += (
-            f"Names: {', '.join(f'`{name}`' for name in names)}.\n\n| key | type | meaning |\n|---|---|---|\n"
+            f"Names: {', '.join(f'`{name}`' for name in names)}.\n\n"
+            "| key | type | left out | meaning |\n|---|---|---|---|\n"
         )
         for name, field in kind.model_fields.items():
-            text += f"| `{name}` | {_kind(field)} | {_about(field)} |\n"
+            text += f"| `{name}` | {_kind(field)} | {_left_out(field)} | {_about(field)} |\n"
     return text
 
 
@@ -66,7 +67,17 @@ def _about(field: FieldInfo) -> str:
     )
 
 
+def _left_out(field: FieldInfo) -> str:
+    """What counts where a cell does not say."""
+    default = field.get_default(call_default_factory=True)
+    if field.is_required():
+        return "refused"
+    return "" if default is None else f"`{_shown(default)}`"
+
+
 def _shown(value: Any) -> str:
+    if isinstance(value, BaseModel):
+        return "{" + ", ".join(f"{name}: {_shown(part)}" for name, part in value) + "}"
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 

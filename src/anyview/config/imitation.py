@@ -139,8 +139,10 @@ class DemonstrationCell(MethodCell):
         "translator makes of no clip but the time step (the clock)"
     )
     model: str = Field(description="the translator: a cell of `translators`")
-    weights: RewardWeights
-    time_power: NonNegative = Field(description="reward at step t is weighted by (t/49) to this power")
+    weights: RewardWeights = RewardWeights(feature=1.0, image=1.0)
+    time_power: NonNegative = Field(
+        default=0.0, description="reward at step t is weighted by (t/49) to this power"
+    )
     incomplete: Incomplete = Field(
         default=Incomplete(),
         description="which frames there are: every n-th (`every`), up to a part of the clip (`until`)",
