@@ -335,8 +335,8 @@ def test_a_name_that_is_no_folder_s_is_refused():
 
 def test_a_missing_key_is_named():
     values = copy.deepcopy(VALUES)
-    del values["imitation"]["cells"]["ours"]["time_power"]
-    with pytest.raises(AnyviewError, match=r"^params.yaml: imitation.cells.ours.time_power: missing key$"):
+    del values["imitation"]["cells"]["ours"]["model"]
+    with pytest.raises(AnyviewError, match=r"^params.yaml: imitation.cells.ours.model: missing key$"):
         parse_params(values)
 
 
