@@ -240,9 +240,14 @@ def test_the_front_page_has_the_numbers_of_what_goes_beyond_the_thesis():
         for end in ("", "-oracle")
     )
     human = study["imitation"]["human"]
+    clips = [
+        ", ".join(count(numbers["clips"][cell]) for cell in ("clips-1", "clips-20", "clips-two-thirds"))
+        for numbers in (beyond, study)
+    ]
     told += [
         f"| {chosen[0]}, {wrong}; {chosen[1]}, {chosen[2]} |",
         f"| {count(human)}, median {centimetres(human)}; not run |",
         f"| {ours} ({true}) |",
+        f"| {clips[0]} | {clips[1]} |",
     ]
     assert [line for line in told if line not in page] == []
