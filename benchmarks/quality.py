@@ -15,20 +15,21 @@ Usage: python benchmarks/quality.py [-S KEY=VALUE ...] [--contexts 16] [--rivals
 
 import argparse
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
-from ruamel.yaml import YAML
+from dvc.exceptions import DvcException
+from dvc.utils.hydra import apply_overrides
 
 from anyview import paths
-from anyview.config import Params, load_params, read_yaml
+from anyview.config import Params, load_params
 from anyview.environments.pusher import PusherEnv
 from anyview.environments.translated import TranslatedReward
 from anyview.evaluation.demonstrations import imitated_demonstrations
@@ -39,7 +40,7 @@ from anyview.pusher.contexts import Context, sample_contexts
 from anyview.pusher.episodes import episode
 from anyview.rewards.demonstration import DemonstrationReward, translate_demonstrations
 from anyview.runtime.device import torch_device, use_threads, worker_count
-from anyview.runtime.errors import exit_code
+from anyview.runtime.errors import AnyviewError, exit_code
 from anyview.runtime.workers import run_tasks
 from anyview.seeds import stream
 from anyview.translator.weights import load_translator
@@ -134,19 +135,15 @@ def rival(
     return tests.seconds, tests.distances
 
 
-def make_model(folder: Path, changes: Sequence[str]) -> dict[str, float]:
+def make_model(folder: Path, changes: list[str]) -> dict[str, float]:
     """Simulate, split and train in ``folder`` by params.yaml with ``changes``: seconds by stage."""
-    values, yaml = read_yaml(ROOT / "params.yaml"), YAML(typ="safe", pure=True)
-    for change in changes:
-        key, value = change.split("=", 1)
-        *above, last = key.split(".")
-        branch = values
-        for part in above:
-            branch = branch.setdefault(part, {})
-        branch[last] = yaml.load(value)
-    with (folder / "params.yaml").open("w") as file:
-        yaml.dump(values, file)
-    imitation = load_params(folder / "params.yaml").imitation
+    params = folder / "params.yaml"
+    shutil.copy(ROOT / "params.yaml", params)
+    try:
+        apply_overrides(params, changes)
+    except DvcException as error:
+        raise AnyviewError(f"-S: {str(error.__cause__ or error).splitlines()[0]}") from error
+    imitation = load_params(params).imitation
     dataset, cell = imitation.dataset, imitation.cells[CELL]
     seconds = {}
     for stage, argument in (("simulate", dataset), ("split", dataset), ("train", cell.model)):

@@ -15,7 +15,7 @@ from anyview.translator.architectures import Translator
 from anyview.video.pixels import to_frames, to_input
 
 _ENTROPY = 0.05  # in units of what standing still costs
-_ROUNDS = 10
+_ROUNDS, _FACTORS = 10, 9  # rounds, and iterations by factors in each
 _LEAST = 1e-30  # mass: no factor is infinite
 
 
@@ -119,20 +119,19 @@ def transport_plan(cost: Tensor, entropy: float, rounds: int) -> Tensor:
     """The plan (..., T, J) that moves mass 1/T of each row to mass 1/J of each column at ``cost``, as large.
 
     It minimises its cost minus ``entropy`` times its entropy, by Sinkhorn's iterations (Cuturi 2013). The
-    first of each round is one of logarithms, which bear any cost; nine are factors to what it gave, two
-    products each and so several times as fast. The rows' sums are met exactly.
+    first of each of ``rounds``, one at least, is of logarithms, which bear any cost; the others are factors to
+    what it gave, two products each and so several times as fast. The rows' sums are met exactly.
     """
     rows, columns = cost.shape[-2:]
     scaled = -cost / entropy
-    of_rows, plan = torch.zeros_like(cost[..., :1]), cost
+    of_rows = torch.zeros_like(cost[..., :1])
     for _ in range(rounds):
         of_columns = -np.log(columns) - torch.logsumexp(scaled + of_rows, dim=-2, keepdim=True)
         of_rows = -np.log(rows) - torch.logsumexp(scaled + of_columns, dim=-1, keepdim=True)
         plan = (scaled + of_rows + of_columns).exp()
         column_factors, row_factors = torch.ones_like(of_columns), torch.ones_like(of_rows)
-        for _ in range(9):
+        for _ in range(_FACTORS):
             column_factors = 1 / columns / (row_factors.mT @ plan).clamp_min(_LEAST)
             row_factors = 1 / rows / (plan @ column_factors.mT).clamp_min(_LEAST)
         of_rows = of_rows + row_factors.log()
-        plan = row_factors * plan * column_factors
-    return plan
+    return row_factors * plan * column_factors
