@@ -28,7 +28,7 @@ from torch.nn import functional as F
 from torch.utils.flop_counter import FlopCounterMode
 
 from anyview.config import LossWeights, Pretraining, Training, TranslatorCell
-from anyview.runtime.device import worker_count
+from anyview.runtime.device import dtype_of_products, worker_count
 from anyview.seeds import torch_seed
 from anyview.training.common.fit import update, validate
 from anyview.training.common.optimization import SharedOptimizer
@@ -134,12 +134,13 @@ class FastLoop:
     def __init__(self, objective: TranslatorObjective):
         torch.set_num_threads(1)
         self._objective, self._model = objective, objective.network()
-        self._optimizer = SharedOptimizer(self._model.parameters(), objective.optimizer, THREADS)
+        dtype = dtype_of_products(objective.training.precision, torch.device("cpu"))
+        self._optimizer = SharedOptimizer(self._model, objective.optimizer, THREADS, dtype)
         self._validation, self._pool = objective.validation(), ThreadPoolExecutor(THREADS)
 
     def step(self, iteration: int) -> float:
         """One update; returns the loss."""
-        return update(self._objective, self._model, self._optimizer, iteration, self._pool)[0].item()
+        return update(self._objective, self._optimizer, iteration, self._pool)[0].item()
 
     def validate(self) -> None:
         """Forward passes of 2 batches."""

@@ -28,7 +28,7 @@ from anyview.pusher.contexts import Context, sample_contexts
 from anyview.pusher.expert import roll_out
 from anyview.pusher.render import renderer
 from anyview.rewards.goal import GoalReward
-from anyview.runtime.device import use_threads
+from anyview.runtime.device import dtype_of_products, use_threads
 from anyview.runtime.scratch import checkpoint_folder
 from anyview.seeds import stream
 from anyview.training.common.fit import update, validate
@@ -67,10 +67,11 @@ def train(params: Params, clips: np.ndarray, updates: int) -> Embedding:
     cell = params.beyond.embeddings["xirl"].model_copy(update={"iterations": updates})
     objective = CycleObjective(cell, params.training, params.base.seed, dataset)
     model, held_out = objective.network(), objective.validation()
-    optimizer = SharedOptimizer(model.parameters(), objective.optimizer, 2)
+    dtype = dtype_of_products(params.training.precision, torch.device("cpu"))
+    optimizer = SharedOptimizer(model, objective.optimizer, 2, dtype)
     with ThreadPoolExecutor(2) as pool:
         for iteration in range(updates):
-            update(objective, model, optimizer, iteration, pool)
+            update(objective, optimizer, iteration, pool)
             if (iteration + 1) % max(updates // 5, 1) == 0:
                 loss, error = validate(objective, model, held_out, pool).tolist()
                 print(f"{iteration + 1} updates: loss {loss:.4f}, time error {error:.3f}", flush=True)

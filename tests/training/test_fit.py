@@ -212,9 +212,9 @@ def test_parts_of_a_batch_add_up_to_its_update(make_objective):
     losses, weights = [], []
     for parts in (1, 2):
         model = made.network()
-        optimizer = SharedOptimizer(model.parameters(), made.optimizer, parts)
+        optimizer = SharedOptimizer(model, made.optimizer, parts)
         with ThreadPoolExecutor(parts) as pool:
-            losses.append(update(made, model, optimizer, 0, pool))
+            losses.append(update(made, optimizer, 0, pool))
         weights.append(parameters(model))
     torch.testing.assert_close(*losses, rtol=1e-4, atol=0)
     torch.testing.assert_close(*weights, rtol=1e-3, atol=1e-5)

@@ -32,29 +32,36 @@ def draw(generator: torch.Generator) -> list[torch.Tensor]:
     threads=st.integers(1, 4),
     parts=st.integers(1, 3),
     missing=st.sets(st.integers(0, len(SHAPES) - 1), max_size=3),
+    dtype=st.sampled_from([torch.float32, torch.bfloat16]),
     seed=st.integers(0, 99),
 )
-def test_it_moves_as_one_optimizer_of_the_summed_gradients(kind, threads, parts, missing, seed):
-    """For any number of threads, and after a restore; parameters that the loss does not reach stay."""
+def test_it_moves_as_one_optimizer_of_the_summed_gradients(kind, threads, parts, missing, dtype, seed):
+    """For any number of threads, and after a restore; parameters that the loss does not reach stay.
+
+    What gradients are taken of has the parameters as they are, in the precision of the products.
+    """
     generator = torch.Generator().manual_seed(seed)
     start = draw(generator)
     ours = [nn.Parameter(tensor.clone()) for tensor in start]
     one = [nn.Parameter(tensor.clone()) for tensor in start]
-    shared, whole = SharedOptimizer(ours, MAKES[kind], threads), MAKES[kind](one)
+    model, whole = nn.ParameterList(ours), MAKES[kind](one)
+    shared = SharedOptimizer(model, MAKES[kind], threads, dtype)
     with ThreadPoolExecutor(threads) as pool:
         for step in range(4):
-            gradients = [draw(generator) for _ in range(parts)]
+            gradients = [[g.to(dtype) for g in draw(generator)] for _ in range(parts)]
             for group in whole.param_groups:
                 group["lr"] = 0.1 / (step + 1)
             for n, parameter in enumerate(one):
-                parameter.grad = None if n in missing else sum(part[n] for part in gradients)
+                parameter.grad = None if n in missing else sum(part[n].float() for part in gradients)
             whole.step()
             reached = [[None if n in missing else g for n, g in enumerate(part)] for part in gradients]
             if step == 2:
                 state = shared.arrays()
-                shared = SharedOptimizer(ours, MAKES[kind], threads)
+                shared = SharedOptimizer(model, MAKES[kind], threads, dtype)
                 shared.restore(state)
             shared.step(0.1 / (step + 1), reached, pool)
+            for working, parameter in zip(shared.working.parameters(), ours, strict=True):
+                assert torch.equal(working, parameter.to(dtype))
     for n, (mine, theirs) in enumerate(zip(ours, one, strict=True)):
         torch.testing.assert_close(mine, theirs, rtol=1e-6, atol=1e-7)
         assert torch.equal(mine, start[n]) == (n in missing)

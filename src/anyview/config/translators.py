@@ -62,6 +62,9 @@ class TranslatorCell(WithExperts):
         description="tell T of the expert's whole clip: by the mean of Enc1 over 8 frames, or for keypoints "
         "by the last frame; not in the thesis",
     )
+    batch_size: Count | None = Field(
+        default=None, description="the cell's own instead of `training.batch_size`"
+    )
     learning_rate: Positive | None = Field(
         default=None, description="the cell's own instead of `training.learning_rate`"
     )

@@ -119,8 +119,8 @@ def transport_plan(cost: Tensor, entropy: float, rounds: int) -> Tensor:
     """The plan (..., T, J) that moves mass 1/T of each row to mass 1/J of each column at ``cost``, as large.
 
     It minimises its cost minus ``entropy`` times its entropy, by Sinkhorn's iterations (Cuturi 2013). The
-    first of each of ``rounds``, one at least, is of logarithms, which bear any cost; the others are factors to
-    what it gave, two products each and so several times as fast. The rows' sums are met exactly.
+    first of each of ``rounds``, one at least, is of logarithms, which bear any cost; the others are factors
+    to what it gave, two products each and so several times as fast. The rows' sums are met exactly.
     """
     rows, columns = cost.shape[-2:]
     scaled = -cost / entropy

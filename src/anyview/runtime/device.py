@@ -33,13 +33,20 @@ def computes_bfloat16(device: "torch.device") -> bool:
     return any(found.get(name, False) for name in ("avx512_bf16", "amx_bf16"))
 
 
-def products_in(precision: str, device: "torch.device") -> "torch.autocast":
-    """A context whose matrix products are in ``precision``: bfloat16 if ``device`` has it, else float32."""
+def dtype_of_products(precision: str, device: "torch.device") -> "torch.dtype":
+    """In what matrix products are computed: bfloat16 if it is the ``precision`` and ``device`` has it."""
     import torch
 
-    reduced = precision == "bfloat16" and computes_bfloat16(device)
+    return torch.bfloat16 if precision == "bfloat16" and computes_bfloat16(device) else torch.float32
+
+
+def products_in(precision: str, device: "torch.device") -> "torch.autocast":
+    """A context whose matrix products are in ``dtype_of_products``."""
+    import torch
+
+    dtype = dtype_of_products(precision, device)
     # Threads would share the cache of converted weights: what each found there would be up to chance.
-    return torch.autocast(device.type, torch.bfloat16, enabled=reduced, cache_enabled=False)
+    return torch.autocast(device.type, torch.bfloat16, enabled=dtype is torch.bfloat16, cache_enabled=False)
 
 
 def use_threads(count: int) -> None:

@@ -62,7 +62,7 @@ class TranslatorObjective:
             raise AnyviewError(f"data sets {self._pretraining.name} and {dataset.name}: frames of {sizes}")
         if cell.weights.places and all(learnt.marks is None for learnt in self._learnt()):
             raise AnyviewError(f"data set {dataset.name}: no marks, which the weight of places needs")
-        own = {"learning_rate": cell.learning_rate, "schedule": cell.schedule}
+        own = {key: getattr(cell, key) for key in ("batch_size", "learning_rate", "schedule")}
         self.training = training.model_copy(update={key: value for key, value in own.items() if value})
         self.optimizer = _OPTIMIZERS[cell.optimizer]
         self._augmentations = (

@@ -101,7 +101,7 @@ def batch_losses(
     task embedding. With ``wanted`` only the losses whose weight is above 0 are computed; ``noise``
     turns dropout on. With ``marks`` there is L_places, of a translator of keypoints, and L_tr is of what it
     draws at the places that are marked. What the decoder makes of the skips is computed once for both
-    decodings.
+    decodings, and these are one batch.
     """
     target = paired[len(context) :]
     found = None
@@ -130,12 +130,27 @@ def batch_losses(
         # Dec learns to draw from the places that are right. Those found at first teach it to blur.
         drawn = with_places(z3, wanted_places)
 
-    def decoding_loss(z: Tensor) -> Tensor:
-        return frame_loss(model.decoder(z, skip_terms, noise), target)
-
+    translated = drawn if wanted is None or wanted.translation else None
+    reconstructed = z_true if wanted is None or wanted.reconstruction else None
+    of_frames = _frame_losses(model, (translated, reconstructed), skip_terms, target, noise)
     return Losses(
-        decoding_loss(drawn) if wanted is None or wanted.translation else None,
-        decoding_loss(z_true) if wanted is None or wanted.reconstruction else None,
+        *of_frames,
         alignment_loss(z3, z_true) if wanted is None or wanted.alignment else None,
         places if wanted is not None and wanted.places else None,
     )
+
+
+def _frame_losses(
+    model: Translator,
+    codes: tuple[Tensor | None, Tensor | None],
+    skip_terms: Any,
+    target: Tensor,
+    noise: Generator | None,
+) -> tuple[Tensor | None, Tensor | None]:
+    """``frame_loss`` of what each of two ``codes`` (N, ...) is decoded to, at once; None for None."""
+    given = [z for z in codes if z is not None]
+    if not given:
+        return None, None
+    decoded = iter(model.decoder(torch.cat(given), skip_terms, noise).chunk(len(given)))
+    first, second = (None if z is None else frame_loss(next(decoded), target) for z in codes)
+    return first, second

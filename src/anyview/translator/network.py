@@ -135,10 +135,9 @@ class SkipConvolution(nn.ConvTranspose2d):
     def forward(self, x: Tensor, terms: SkipTerms) -> Tensor:  # type: ignore[override]
         """The layer's output for ``x`` (N, ...) and the ``terms`` of K contexts, row n modulo K."""
         own = self._convolve(x, terms.weight, None)
-        known = terms.map
-        if len(known) != len(own):
-            known = known.repeat(len(own) // len(known), 1, 1, 1)
-        return own.add_(known)
+        if len(own) == len(terms.map):
+            return own.add_(terms.map)
+        return (own.unflatten(0, (-1, len(terms.map))) + terms.map).flatten(0, 1)
 
     def _convolve(self, x: Tensor, weight: Tensor, bias: Tensor | None) -> Tensor:
         return fractional_convolution(x, weight.to(x.dtype), bias, self.stride[0])

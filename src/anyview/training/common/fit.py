@@ -14,7 +14,7 @@ from torch import Tensor, nn
 
 from anyview.config import CycleCell, EmbeddingCell, Training, TranslatorCell
 from anyview.runtime.checkpoints import Checkpoints
-from anyview.runtime.device import torch_device, use_threads
+from anyview.runtime.device import dtype_of_products, torch_device, use_threads
 from anyview.runtime.errors import AnyviewError
 from anyview.runtime.outputs import whole_folder, write_atomically
 from anyview.runtime.progress import track
@@ -130,7 +130,8 @@ def fit(name: str, objective: Objective[B], output: Path) -> None:
     device = torch_device()
     parts = _PARTS if device.type == "cpu" else 1
     model = objective.network().to(device)
-    optimizer = SharedOptimizer(model.parameters(), objective.optimizer, parts)
+    dtype = dtype_of_products(training.precision, device)
+    optimizer = SharedOptimizer(model, objective.optimizer, parts, dtype)
     validation = objective.validation()
     done, best, rows = _resume(checkpoints, model, optimizer)
     start, began = done, time.monotonic()
@@ -138,7 +139,7 @@ def fit(name: str, objective: Objective[B], output: Path) -> None:
     with ThreadPoolExecutor(parts) as pool, track(f"train {name}", total, done) as tracker:
         while done < total:
             stop = min(done - done % training.validation_every + training.validation_every, total)
-            losses = [update(objective, model, optimizer, iteration, pool) for iteration in range(done, stop)]
+            losses = [update(objective, optimizer, iteration, pool) for iteration in range(done, stop)]
             means = torch.stack(losses).double().mean(0)
             row = {"iteration": stop} | dict(zip(objective.names, means.tolist(), strict=True))
             found = objective.validation_row(validate(objective, model, validation, pool))
@@ -149,8 +150,8 @@ def fit(name: str, objective: Objective[B], output: Path) -> None:
                 best = _weights(model)
             rows.append(row)
             _write_curve(live, rows)
-            speed = (stop - start) * training.batch_size / (time.monotonic() - began)
-            note = f"loss {row['loss']:.4g}, validation {row['validation_loss']:.4g}, {speed:.0f} samples/s"
+            speed = (stop - start) / (time.monotonic() - began)
+            note = f"loss {row['loss']:.4g}, validation {row['validation_loss']:.4g}, {speed:.1f} updates/s"
             tracker.advance(stop - done, note)
             done = stop
             if checkpoints.due() and done < total:
@@ -163,11 +164,10 @@ def fit(name: str, objective: Objective[B], output: Path) -> None:
     checkpoints.clear()
 
 
-def update(
-    objective: Objective[B], model: nn.Module, optimizer: SharedOptimizer, iteration: int, pool: Executor
-) -> Tensor:
-    """One update of ``model`` by the iteration's batch; returns the batch's losses (L,)."""
-    batch, parameters = objective.batch(iteration), list(model.parameters())
+def update(objective: Objective[B], optimizer: SharedOptimizer, iteration: int, pool: Executor) -> Tensor:
+    """One update of the optimiser's model by the iteration's batch; returns the batch's losses (L,)."""
+    batch, model = objective.batch(iteration), optimizer.working
+    parameters = list(model.parameters())
 
     def gradients(part: int, pairs: B) -> tuple[Tensor, tuple[Tensor | None, ...]]:
         """Losses and gradients of one part of the batch, weighted by its fraction of the batch."""

@@ -1,7 +1,8 @@
 """How parameters move: an iteration's learning rate, and an optimiser that threads share."""
 
+import copy
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 
 import numpy as np
@@ -22,15 +23,24 @@ def learning_rate(training: Training, iteration: int, iterations: int) -> float:
 
 
 class SharedOptimizer:
-    """An optimiser whose parameters are dealt out to ``count`` threads.
+    """An optimiser of ``model`` whose parameters are dealt out to ``count`` threads.
 
     Each thread moves its parameters by an optimiser of its own. No parameter's update depends on another's.
     So the result is that of one optimiser for all.
+
+    Gradients are those of ``working``: of the model itself, or of a copy whose parameters are the model's in
+    ``dtype``. So they are converted once an update, not wherever a product needs them.
     """
 
-    def __init__(self, parameters: Iterable[nn.Parameter], make: MakeOptimizer, count: int):
-        self.count = count
-        self._parameters = list(parameters)
+    def __init__(self, model: nn.Module, make: MakeOptimizer, count: int, dtype: torch.dtype = torch.float32):
+        self.count, self.working = count, model
+        self._parameters = list(model.parameters())
+        self._copies: list[nn.Parameter] = []
+        if dtype is not torch.float32:
+            self.working = copy.deepcopy(model)
+            self._copies = list(self.working.parameters())
+            for parameter in self._copies:
+                parameter.data = parameter.data.to(dtype)
         self._hands = _deal([parameter.numel() for parameter in self._parameters], count)
         self._optimizers = [make([self._parameters[n] for n in hand]) for hand in self._hands]
 
@@ -41,14 +51,22 @@ class SharedOptimizer:
         """
 
         def move(number: int) -> None:
-            optimizer = self._optimizers[number]
-            for n in self._hands[number]:
+            optimizer, hand = self._optimizers[number], self._hands[number]
+            for n in hand:
                 self._parameters[n].grad = _sum(self._parameters[n], [part[n] for part in gradients])
             for group in optimizer.param_groups:
                 group["lr"] = rate
             optimizer.step()
+            self._convert(hand)
 
         list(pool.map(move, range(len(self._optimizers))))
+
+    @torch.no_grad()
+    def _convert(self, numbers: Sequence[int]) -> None:
+        """Bring the working copy's parameters of these ``numbers`` up to date."""
+        if self._copies:
+            for n in numbers:
+                self._copies[n].copy_(self._parameters[n])
 
     def arrays(self) -> dict[str, np.ndarray]:
         """The state as ``N/key`` of the parameter's number, for a checkpoint."""
@@ -60,7 +78,7 @@ class SharedOptimizer:
         }
 
     def restore(self, arrays: dict[str, np.ndarray]) -> None:
-        """Continue from ``arrays()`` bit for bit."""
+        """Continue from ``arrays()`` bit for bit, with a model that is as it was."""
         states: dict[int, dict[str, Tensor]] = {}
         for name, array in arrays.items():
             number, key = name.split("/")
@@ -70,6 +88,7 @@ class SharedOptimizer:
         for hand, optimizer in zip(self._hands, self._optimizers, strict=True):
             own = {index: states[n] for index, n in enumerate(hand) if n in states}
             optimizer.load_state_dict(optimizer.state_dict() | {"state": own})
+        self._convert(range(len(self._parameters)))
 
 
 def _deal(sizes: list[int], count: int) -> list[list[int]]:
@@ -91,7 +110,7 @@ def _sum(parameter: Tensor, gradients: Gradients) -> Tensor | None:
     if not reached:
         return None
     total = reached[0]
-    if total.stride() != parameter.stride():
+    if (total.dtype, total.stride()) != (parameter.dtype, parameter.stride()):
         total = _laid_out_as(parameter, total)
     for part in reached[1:]:
         total.add_(part)
