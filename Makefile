@@ -28,15 +28,15 @@ help: ## list the targets
 
 repro: .setup-stamp .setup-stamp-graphics ## run the whole pipeline; only what changed runs again
 	python stages/check.py
-	dvc repro
+	anyview repro
 
 beyond: .setup-stamp .setup-stamp-graphics ## run what goes beyond the thesis as well, and what it needs of the rest
-	dvc repro check simulate@diverse split@diverse split@real split@rendered train@sim embed@tcn imitate@ours
-	cd beyond && dvc repro
+	anyview repro check simulate@diverse split@diverse split@real split@rendered train@sim embed@tcn imitate@ours
+	cd beyond && anyview repro
 
 evidence: .setup-stamp .setup-stamp-graphics ## several models of each kind, three questions: hours, see docs/scaling.md
-	dvc repro check simulate@diverse split@diverse
-	cd evidence && { dvc repro --keep-going; ended=$$?; python report.py && exit $$ended; }
+	anyview repro check simulate@diverse split@diverse
+	cd evidence && { anyview repro; ended=$$?; python report.py && exit $$ended; }
 
 test: lint .setup-stamp-graphics ## lint, type check and the fast tests
 	python -m pytest $(PARALLEL)
