@@ -1,16 +1,23 @@
-"""What both discriminators share: the penalty on their gradients, by hand and in training."""
+"""What both discriminators share: the penalty on their gradients, by hand and in training, and shifts."""
 
 import numpy as np
 import pytest
 import torch
+from hypothesis import given
+from hypothesis import strategies as st
 from torch import Tensor, nn
 
-from anyview.adversarial.common.discriminators import Discriminator, Views, gradient_penalty
+from anyview.adversarial.common.discriminators import Discriminator, Views, gradient_penalty, shifted
 from anyview.adversarial.gail import FrameDiscriminator, gail_reward
 from anyview.adversarial.tpil import PairDiscriminator
 from tests.learners.toy import PARAMS, SIZE, clip_set, expert_motion, random_motion, show, squares
 
-NETWORKS = {"gail": lambda: FrameDiscriminator(SIZE), "tpil": lambda: PairDiscriminator(SIZE, 0.2)}
+NETWORKS = {
+    "gail": lambda: FrameDiscriminator(SIZE, halved=True),
+    "gail, whole frames": lambda: FrameDiscriminator(SIZE, halved=False),
+    "tpil": lambda: PairDiscriminator(SIZE, halved=True, domain_weight=0.2),
+    "tpil, whole frames": lambda: PairDiscriminator(SIZE, halved=False, domain_weight=0.2),
+}
 
 
 class Quadratic(Discriminator):
@@ -76,3 +83,32 @@ def test_with_the_penalty_logits_of_expert_and_agent_stay_close():
         expert = show(reward, squares(expert_motion(2))[None])
         spread[weight] = expert.mean() - show(reward, agent).mean()
     assert 0 < spread[10.0] < spread[0.0] / 2
+
+
+@given(most=st.integers(0, 3), seed=st.integers(0, 99))
+def test_a_shift_moves_both_frames_of_a_view_alike_and_repeats_borders(most: int, seed: int):
+    """The pixel at a place is what was there before the shift, or at the nearest place in the frame."""
+    views = batch_of(6, lag=3)
+    moved = shifted(views, most, np.random.default_rng(seed))
+    assert torch.equal(moved.time, views.time)
+    places, offsets = np.arange(SIZE), range(-most, most + 1)
+
+    def at(frame: Tensor, x: int, y: int) -> Tensor:
+        return frame[:, (places + y).clip(0, SIZE - 1)][:, :, (places + x).clip(0, SIZE - 1)]
+
+    for before, now, after, seen in zip(views.before, views.now, moved.before, moved.now, strict=True):
+        assert any(
+            torch.equal(seen, at(now, x, y)) and torch.equal(after, at(before, x, y))
+            for x in offsets
+            for y in offsets
+        )
+
+
+def test_shifts_are_drawn_for_every_view():
+    """A square in the middle of equal frames ends up in several places."""
+    frames = torch.zeros(40, 3, SIZE, SIZE)
+    frames[:, :, 8, 8] = 1.0
+    moved = shifted(Views(frames, frames, torch.zeros(40)), 1, np.random.default_rng(0))
+    assert {divmod(int(frame[0].argmax()), SIZE) for frame in moved.now} == {
+        (y, x) for y in (7, 8, 9) for x in (7, 8, 9)
+    }

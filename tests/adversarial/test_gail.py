@@ -30,7 +30,7 @@ def practise(reward: LearnedReward, runs: list[int], iterations: range) -> list[
 
 def test_loss_is_that_of_the_paper():
     torch.manual_seed(0)
-    network = FrameDiscriminator(SIZE)
+    network = FrameDiscriminator(SIZE, halved=True)
     rng = np.random.default_rng(0)
     batch = {
         "expert": clip_set(squares(expert_motion(3))).draw(rng, 5, 0),

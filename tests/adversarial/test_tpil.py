@@ -35,7 +35,7 @@ def test_the_gradient_is_reversed_and_scaled():
 def test_features_are_pushed_to_confuse_the_domain_head_that_itself_learns_to_tell():
     """Gradients of the whole loss, against those of the two cross-entropies taken apart."""
     torch.manual_seed(0)
-    network = PairDiscriminator(SIZE, domain_weight=0.5)
+    network = PairDiscriminator(SIZE, halved=True, domain_weight=0.5)
     batch = batch_of(network)
     features = list(network.features.parameters())
     head = list(network.domain_head.parameters())

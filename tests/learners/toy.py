@@ -13,6 +13,8 @@ PARAMS = config.Discriminator(
     memory=6,
     rescored=4,
     gradient_penalty=0.0,
+    halved=True,
+    shift=0,
     domain_weight=0.2,
 )
 

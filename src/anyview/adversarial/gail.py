@@ -29,16 +29,16 @@ _LEAK = 0.2
 
 
 class FrameDiscriminator(Discriminator):
-    """D(o_t, t): three strided convolutions on the frame at half its size; time joins the connected layer.
+    """D(o_t, t): three strided convolutions on the frame, ``halved`` or not; time joins the connected layer.
 
     Time comes as radial basis functions beside the number. From the number alone the discriminator learns
     many times slower that the same frame is the expert's at one time and not at another.
     """
 
-    def __init__(self, image_size: int):
+    def __init__(self, image_size: int, halved: bool):
         super().__init__()
-        layers: list[nn.Module] = [nn.AvgPool2d(2)]
-        before, side = 3, image_size // 2
+        layers: list[nn.Module] = [nn.AvgPool2d(2)] if halved else []
+        before, side = 3, image_size // 2 if halved else image_size
         for channels in _CHANNELS:
             layers += [nn.Conv2d(before, channels, 3, stride=2, padding=1), nn.LeakyReLU(_LEAK)]
             before, side = channels, -(-side // 2)
@@ -65,7 +65,7 @@ def gail_reward(
     """The reward of ``runs``, each with its set of expert clips."""
     size = experts[0].frames.shape[2]
     sets = [{"expert": clips} for clips in experts]
-    return LearnedReward(lambda: FrameDiscriminator(size), params, seed, runs, sets)
+    return LearnedReward(lambda: FrameDiscriminator(size, params.halved), params, seed, runs, sets)
 
 
 def make_reward(group: Group) -> Scoring:

@@ -53,16 +53,16 @@ class ReverseGradient(torch.autograd.Function):
 class PairDiscriminator(Discriminator):
     """Two 3x3 convolutions of 5 channels, each with 2x2 pooling; heads with one connected layer of 128.
 
-    As in ``gail`` frames are seen at half their size, which is near the paper's 50 pixels.
+    The paper has frames of 50 pixels; they are ``halved`` or not, as in ``gail``.
     """
 
     lag = 3
 
-    def __init__(self, image_size: int, domain_weight: float):
+    def __init__(self, image_size: int, halved: bool, domain_weight: float):
         super().__init__()
         self._domain_weight = domain_weight
         self.features = nn.Sequential(
-            nn.AvgPool2d(2),
+            *([nn.AvgPool2d(2)] if halved else []),
             nn.Conv2d(3, _CHANNELS, 3, padding=1),
             nn.MaxPool2d(2),
             nn.LeakyReLU(_LEAK),
@@ -71,7 +71,7 @@ class PairDiscriminator(Discriminator):
             nn.LeakyReLU(_LEAK),
             nn.Flatten(),
         )
-        size = _CHANNELS * (image_size // 8) ** 2
+        size = _CHANNELS * (image_size // (8 if halved else 4)) ** 2
         self.class_head = _head(2 * size)
         self.domain_head = _head(size)
 
@@ -128,7 +128,11 @@ def tpil_reward(
         {"expert": expert, "bystander": bystander}
         for expert, bystander in zip(experts, bystanders, strict=True)
     ]
-    return LearnedReward(lambda: PairDiscriminator(size, params.domain_weight), params, seed, runs, sets)
+
+    def make() -> PairDiscriminator:
+        return PairDiscriminator(size, params.halved, params.domain_weight)
+
+    return LearnedReward(make, params, seed, runs, sets)
 
 
 def wrong_pushes(contexts: Sequence[Context], rng: np.random.Generator, image_size: int) -> np.ndarray:

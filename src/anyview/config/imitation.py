@@ -74,6 +74,10 @@ class Discriminator(Block):
     gradient_penalty: NonNegative = Field(
         description="weight of the mean squared gradient of its logits by the frames; 0 leaves it out"
     )
+    halved: bool = Field(description="it sees frames at half their size, where 2 cm are half a pixel")
+    shift: CountOrNone = Field(
+        description="pixels by which what it learns from is shifted at random, at most"
+    )
     domain_weight: NonNegative = Field(description="gradient reversal of TPIL's domain head")
 
 

@@ -78,6 +78,22 @@ def cross_entropy(logits: Tensor, label: float) -> Tensor:
     return F.binary_cross_entropy_with_logits(logits, torch.full_like(logits, label))
 
 
+def shifted(views: Views, most: int, rng: np.random.Generator) -> Views:
+    """``views`` by up to ``most`` pixels each way, a view's frames alike, borders repeated.
+
+    After Kostrikov et al. (2021). Where few frames are known, a network that saw each of them in one place
+    alone learns it by heart.
+    """
+    if not most:
+        return views
+    frames = F.pad(torch.cat([views.before, views.now], 1), [most] * 4, mode="replicate")
+    height, width = views.now.shape[2:]
+    places = rng.integers(0, 2 * most + 1, (len(frames), 2))
+    cut = [frame[:, y : y + height, x : x + width] for frame, (y, x) in zip(frames, places, strict=True)]
+    before, now = torch.stack(cut).chunk(2, 1)
+    return Views(before, now, views.time)
+
+
 def gradient_penalty(network: Discriminator, batches: Sequence[Views]) -> Tensor:
     """Mean of |d logits / d frames|^2 over ``batches``, a scalar.
 
@@ -181,10 +197,18 @@ class LearnedReward:
             )
             for row, remembered in enumerate(self._memory)
         )
-        losses = [self._loss(network, views) for network, views in zip(self.networks, batches, strict=True)]
+        losses = [
+            self._loss(network, self._shifted(views, run, index))
+            for network, views, run in zip(self.networks, batches, self._runs, strict=True)
+        ]
         self._optimizer.zero_grad()
         torch.stack(losses).sum().backward()
         self._optimizer.step()
+
+    def _shifted(self, batches: Mapping[str, Views], run: int, index: int) -> dict[str, Views]:
+        """Every set's batch, shifted at random."""
+        rng = stream(self._seed, "discriminator-shift", run, self._iteration, index)
+        return {name: shifted(views, self._params.shift, rng) for name, views in batches.items()}
 
     def _loss(self, network: Discriminator, views: Mapping[str, Views]) -> Tensor:
         """The network's own loss and the penalty on its gradients."""
