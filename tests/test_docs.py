@@ -244,10 +244,15 @@ def test_the_front_page_has_the_numbers_of_what_goes_beyond_the_thesis():
         ", ".join(count(numbers["clips"][cell]) for cell in ("clips-1", "clips-20", "clips-two-thirds"))
         for numbers in (beyond, study)
     ]
+    angles = [
+        ", ".join(count(numbers["viewpoints"]["angles"][angle]) for angle in ("0", "180"))
+        for numbers in (beyond, study)
+    ]
     told += [
         f"| {chosen[0]}, {wrong}; {chosen[1]}, {chosen[2]} |",
         f"| {count(human)}, median {centimetres(human)}; not run |",
         f"| {ours} ({true}) |",
         f"| {clips[0]} | {clips[1]} |",
+        f"| {angles[0]} | {angles[1]} |",
     ]
     assert [line for line in told if line not in page] == []
