@@ -2,6 +2,7 @@
 
 import torch
 from torch import Tensor, nn
+from torch.nn import functional as F
 
 KEYPOINTS = 8
 STROKES = 2 * KEYPOINTS - 1  # the keypoints, and the lines from each to the next
@@ -74,10 +75,18 @@ def _squares(places: Tensor, grid: Tensor) -> Tensor:
     return torch.cat((squares, squares[:, :-1] - t * (2 * along - t * length)), 1)
 
 
+class _GroupNorm(nn.GroupNorm):
+    """In float32, whatever it is given: of channels_last in bfloat16 PyTorch's own takes six times as long."""
+
+    def forward(self, input: Tensor) -> Tensor:
+        weight, bias = self.weight.float(), self.bias.float()
+        return F.group_norm(input.float(), self.num_groups, weight, bias, self.eps).to(input.dtype)
+
+
 def convolution(inputs: int, outputs: int, kernel: int, stride: int = 1) -> nn.Sequential:
     """A convolution, normalised in groups of 8 channels (Wu and He 2018): half of the updates do."""
     return nn.Sequential(
         nn.Conv2d(inputs, outputs, kernel, stride, padding=kernel // 2),
-        nn.GroupNorm(outputs // 8, outputs),
+        _GroupNorm(outputs // 8, outputs),
         nn.LeakyReLU(0.2, inplace=True),
     )
