@@ -76,7 +76,7 @@ def _squares(places: Tensor, grid: Tensor) -> Tensor:
 
 
 class _GroupNorm(nn.GroupNorm):
-    """In float32, whatever it is given: of channels_last in bfloat16 PyTorch's own takes six times as long."""
+    """In float32, whatever it is given: in bfloat16 and channels_last PyTorch's takes six times as long."""
 
     def forward(self, input: Tensor) -> Tensor:
         weight, bias = self.weight.float(), self.bias.float()
