@@ -29,7 +29,7 @@ def test_train_then_translate(study, root):
     trained = run(root / "stages/train.py", "sim")
     assert trained.returncode == 0, trained.stderr
     assert "10/10" in trained.stdout
-    assert "updates/s" in trained.stdout
+    assert "samples/s" in trained.stdout
     translated = run(root / "stages/translate.py", "sim")
     assert translated.returncode == 0, translated.stderr
     assert len(pd.read_csv("data/translations/sim/clips.csv")) == 5

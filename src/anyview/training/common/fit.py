@@ -150,8 +150,8 @@ def fit(name: str, objective: Objective[B], output: Path) -> None:
                 best = _weights(model)
             rows.append(row)
             _write_curve(live, rows)
-            speed = (stop - start) / (time.monotonic() - began)
-            note = f"loss {row['loss']:.4g}, validation {row['validation_loss']:.4g}, {speed:.1f} updates/s"
+            speed = (stop - start) * training.batch_size / (time.monotonic() - began)
+            note = f"loss {row['loss']:.4g}, validation {row['validation_loss']:.4g}, {speed:.0f} samples/s"
             tracker.advance(stop - done, note)
             done = stop
             if checkpoints.due() and done < total:
