@@ -146,24 +146,25 @@ def write_set(root: Path, name: str, azimuths: np.ndarray) -> None:
 def test_every_part_has_a_page_with_its_verdicts(tmp_path):
     """One view alone ends far away, all else is alike; without L_tr it ends farther, without L_align not."""
     evidence, data = load_params(ROOT / "params.yaml").evidence, Data(tmp_path)
+    last = evidence.losses.iterations
     for name, metres in (("sim", 0.03), ("sim-no-translation", 0.4), ("sim-no-alignment", 0.03)):
         for seed in evidence.losses.seeds:
             for reward in evidence.losses.rewards:
-                data.policies(paths.replicate(name, seed, reward), metres, last=150)
+                data.policies(paths.replicate(name, seed, reward), metres, last=last)
     for views, clutter in product((1, 4, "any"), paths.CLUTTER):
         name = paths.restricted_set(str(views), clutter)
         apart = 360 if views == "any" else views
         write_set(tmp_path, name, 2 * np.pi * (np.arange(4000) % apart) / apart)
         for seed, count in product(evidence.diversity.seeds, (250, 4000)):
             policies = paths.replicate(f"{name}-{count}", seed, "diverse")
-            data.policies(policies, 0.3 if views == 1 else 0.03, last=150)
+            data.policies(policies, 0.3 if views == 1 else 0.03, last=evidence.diversity.iterations)
             contexts = [{"azimuth": azimuth} for azimuth in np.linspace(0, np.pi, 15)]
             (tmp_path / paths.policies(policies) / "policy.json").write_text(
                 json.dumps({"contexts": contexts})
             )
     for name, seed in product(("ours", "oracle"), evidence.headline.seeds):
         metres = {"ours": 0.03, "oracle": 0.01}[name]
-        data.policies(paths.replicate(paths.headline(name), seed), metres, last=250)
+        data.policies(paths.replicate(paths.headline(name), seed), metres, last=evidence.headline.iterations)
 
     done = report(tmp_path)
     assert done.returncode == 0, done.stderr
