@@ -4,6 +4,7 @@ import runpy
 
 import numpy as np
 import pandas as pd
+import torch
 
 from anyview.adversarial.tpil import tpil_reward
 from anyview.config import RewardWeights, load_params
@@ -51,5 +52,6 @@ def test_a_reward_of_two_frames_is_given_both(expert_clips, root):
     worth = values(reward, expert_clips[3:], [10, 49])
     for run, network in enumerate(reward.networks):
         features = network.features(to_input(expert_clips[3 + run][[7, 10, 46, 49]]))
-        expected = [network._logits(*pair[:, None]).item() for pair in features.view(2, 2, -1)]
+        pairs = features.view(2, 2, -1)
+        expected = network.score(pairs[:, 0], pairs[:, 1], torch.ones(2)).tolist()
         np.testing.assert_allclose(worth[run], expected, rtol=1e-4, atol=1e-6)

@@ -14,6 +14,7 @@ from anyview import config
 from anyview.adversarial.common.discriminators import (
     ClipSet,
     Discriminator,
+    Halve,
     LearnedReward,
     Views,
     cross_entropy,
@@ -37,7 +38,7 @@ class FrameDiscriminator(Discriminator):
 
     def __init__(self, image_size: int, halved: bool):
         super().__init__()
-        layers: list[nn.Module] = [nn.AvgPool2d(2)] if halved else []
+        layers: list[nn.Module] = [Halve()] if halved else []
         before, side = 3, image_size // 2 if halved else image_size
         for channels in _CHANNELS:
             layers += [nn.Conv2d(before, channels, 3, stride=2, padding=1), nn.LeakyReLU(_LEAK)]
@@ -46,10 +47,9 @@ class FrameDiscriminator(Discriminator):
         self.hidden = nn.Linear(before * side**2 + 1 + _TIME_FEATURES, _WIDTH)
         self.output = nn.Linear(_WIDTH, 1)
 
-    def logits(self, views: Views) -> Tensor:
+    def score(self, before: Tensor, now: Tensor, time: Tensor) -> Tensor:
         """log D/(1 - D), (B,)."""
-        time = with_time_features(2 * views.time[:, None] - 1, _TIME_FEATURES)
-        inputs = torch.cat([self.features(views.now), time], dim=1)
+        inputs = torch.cat([now, with_time_features(2 * time[:, None] - 1, _TIME_FEATURES)], dim=1)
         return self.output(F.leaky_relu(self.hidden(inputs), _LEAK)).squeeze(1)
 
     def loss(self, views: Mapping[str, Views]) -> Tensor:

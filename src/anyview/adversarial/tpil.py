@@ -20,6 +20,7 @@ from anyview import config
 from anyview.adversarial.common.discriminators import (
     ClipSet,
     Discriminator,
+    Halve,
     LearnedReward,
     Views,
     cross_entropy,
@@ -62,7 +63,7 @@ class PairDiscriminator(Discriminator):
         super().__init__()
         self._domain_weight = domain_weight
         self.features = nn.Sequential(
-            *([nn.AvgPool2d(2)] if halved else []),
+            *([Halve()] if halved else []),
             nn.Conv2d(3, _CHANNELS, 3, padding=1),
             nn.MaxPool2d(2),
             nn.LeakyReLU(_LEAK),
@@ -75,15 +76,15 @@ class PairDiscriminator(Discriminator):
         self.class_head = _head(2 * size)
         self.domain_head = _head(size)
 
-    def logits(self, views: Views) -> Tensor:
+    def score(self, before: Tensor, now: Tensor, time: Tensor) -> Tensor:
         """log P(expert)/P(not expert), (B,)."""
-        return self._logits(self.features(views.before), self.features(views.now))
+        return self.class_head(torch.cat([before, now], dim=1)).squeeze(1)
 
     def loss(self, views: Mapping[str, Views]) -> Tensor:
         """Cross-entropy of both heads; in each, both labels weigh the same."""
         before = {name: self.features(batch.before) for name, batch in views.items()}
         now = {name: self.features(batch.now) for name, batch in views.items()}
-        classes = {name: self._logits(before[name], now[name]) for name in views}
+        classes = {name: self.score(before[name], now[name], batch.time) for name, batch in views.items()}
         domains = {name: self._domain(features) for name, features in now.items()}
         not_expert = cross_entropy(torch.cat([classes["agent"], classes["bystander"]]), 0.0)
         expert_view = cross_entropy(torch.cat([domains["expert"], domains["bystander"]]), 1.0)
@@ -102,9 +103,6 @@ class PairDiscriminator(Discriminator):
         }
         expert_view = (told["expert"] + told["bystander"]) / 2
         return super().accuracies(views) | {"domain_accuracy": (expert_view + told["agent"]) / 2}
-
-    def _logits(self, before: Tensor, now: Tensor) -> Tensor:
-        return self.class_head(torch.cat([before, now], dim=1)).squeeze(1)
 
     def _domain(self, features: Tensor) -> Tensor:
         """log P(expert's view)/P(agent's view), (B,)."""

@@ -47,13 +47,28 @@ class ClipSet:
 
 
 class Discriminator(nn.Module):
-    """One run's network. Batches come by the name of their set: "expert", "agent" and what else it needs."""
+    """One run's network. Batches come by the name of their set: "expert", "agent" and what else it needs.
+
+    ``features`` (B, ...) are of single frames, so that what many views share is seen once.
+    """
 
     lag = 0
+    features: Callable[[Tensor], Tensor]
+
+    def score(self, before: Tensor, now: Tensor, time: Tensor) -> Tensor:
+        """log P(expert)/P(not expert), (B,), by features of both frames of a view: the reward."""
+        raise NotImplementedError
 
     def logits(self, views: Views) -> Tensor:
-        """log P(expert)/P(not expert), (B,): the reward of what is seen."""
-        raise NotImplementedError
+        """The ``score`` of ``views``, (B,)."""
+        now = self.features(views.now)
+        return self.score(self.features(views.before) if self.lag else now, now, views.time)
+
+    def score_clip(self, frames: np.ndarray) -> Tensor:
+        """The ``score`` of every step of a clip ``frames`` (T + 1, H, W, 3), (T,)."""
+        now = self.features(to_input(frames[1:]))
+        steps = torch.arange(len(now))
+        return self.score(now[(steps - self.lag).clamp(min=0)], now, (steps + 1) / len(now))
 
     def loss(self, views: Mapping[str, Views]) -> Tensor:
         """What training minimises, a scalar."""
@@ -66,6 +81,14 @@ class Discriminator(nn.Module):
             f"{name}_accuracy": ((self.logits(batch) > 0) == expected[name]).float().mean()
             for name, batch in views.items()
         }
+
+
+class Halve(nn.Module):
+    """Frames (B, C, H, W) at half their size: AvgPool2d takes six times as long where colours are last."""
+
+    def forward(self, frames: Tensor) -> Tensor:
+        rows = frames[..., ::2, :] + frames[..., 1::2, :]
+        return (rows[..., ::2] + rows[..., 1::2]) / 4
 
 
 def _every(frames: np.ndarray) -> ClipSet:
@@ -135,6 +158,7 @@ class LearnedReward:
         self._shape = sets[0]["expert"].frames.shape[1:]
         self._iteration = 0
         self._seen = np.zeros((len(self._runs), 0, *self._shape), np.uint8)
+        self._features: list[list[Tensor]] = []  # of each run's newest frames
         self._memory = np.zeros((len(self._runs), params.memory, *self._shape), np.uint8)  # a ring
         self._written = 0
 
@@ -144,12 +168,14 @@ class LearnedReward:
         runs, copies = frames.shape[:2]
         if step == 1:
             self._seen = np.zeros((runs, copies, *self._shape), np.uint8)
+            self._features = [[] for _ in range(runs)]
         self._seen[:, :, step] = frames
         time = torch.full((copies,), step / (self._shape[0] - 1))
         rewards = []
-        for network, seen in zip(self.networks, self._seen, strict=True):
-            now, before = to_input(seen[:, step]), to_input(seen[:, max(step - network.lag, 1)])
-            rewards.append(network.logits(Views(before, now, time)))
+        for network, features, now in zip(self.networks, self._features, to_input(frames), strict=True):
+            features.append(network.features(now))
+            del features[: -network.lag - 1]
+            rewards.append(network.score(features[0], features[-1], time))
         return torch.stack(rewards).numpy()
 
     def end_iteration(self) -> Arrays:
@@ -170,14 +196,12 @@ class LearnedReward:
     @torch.inference_mode()
     def rescored(self) -> np.ndarray:
         """Rewards (R, E, T) of the newest episodes, the oldest of them first."""
-        times, rows = np.arange(1, self._shape[0]), self._newest(self._params.rescored)
-        rewards = np.zeros((len(self.networks), len(rows), len(times)), np.float32)
-        for network, episodes, earned in zip(self.networks, self._memory, rewards, strict=True):
-            clips = ClipSet(episodes, rows)
-            for index, row in enumerate(rows):
-                views = clips.views(np.full(len(times), row), times, network.lag)
-                earned[index] = network.logits(views).numpy()
-        return rewards
+        rows = self._newest(self._params.rescored)
+        rewards = [
+            torch.stack([network.score_clip(episodes[row]) for row in rows])
+            for network, episodes in zip(self.networks, self._memory, strict=True)
+        ]
+        return torch.stack(rewards).numpy()
 
     def _newest(self, count: int) -> np.ndarray:
         """Where the newest ``count`` episodes are in the memory, or all if it has fewer; the oldest first."""
