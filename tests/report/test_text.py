@@ -33,6 +33,17 @@ def test_orders_are_claimed_by_the_corrected_test(data, params):
     assert paragraph(text, "No order") == "No order can be claimed between ours and: without L_align."
 
 
+def test_every_translator_says_how_many_frames_its_batches_have(data, params):
+    """`compact` cells have batches of their own."""
+    data.translator("sim", iterations=520)
+    data.translator("real-adam", iterations=520)
+    own, common = params.translators["sim"].batch_size, params.training.batch_size
+    assert own != common
+    text = text_of(data, params)
+    assert f"| Iterations of sim | not stated | 520 batches of {own} |" in text
+    assert f"| Iterations of real-adam | 11,750 | 520 batches of {common} |" in text
+
+
 def test_a_method_of_few_runs_is_open(data, params):
     data.policies("ours", 0.03)
     data.policies("gail", 0.5, returns=False)
