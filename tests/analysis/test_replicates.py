@@ -160,7 +160,8 @@ def test_only_what_has_all_of_its_seeds_is_read(data, params):
 def test_policies_of_another_budget_are_not_mixed_with_those_of_params(data, params):
     for seed in params.evidence.losses.seeds:
         data.policies(paths.replicate("sim", seed, "raw"), 0.03, last=90)
-    with pytest.raises(AnyviewError, match=r"sim-seed-1-raw.*for 90 iterations, where params.yaml says 150"):
+    told = rf"sim-seed-1-raw.*for 90 iterations, where params.yaml says {params.evidence.losses.iterations}"
+    with pytest.raises(AnyviewError, match=told):
         read_replicates(params, data.root)
 
 
